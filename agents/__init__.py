@@ -1,0 +1,1 @@
+"""Who chooses the shots: policies, training, evaluation, statistics, report, command line."""

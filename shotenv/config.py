@@ -1,0 +1,328 @@
+"""Typed configuration: one frozen pydantic model per section, read from YAML by jsonargparse.
+
+A section is given as a *name* (`"epc660"`, a file in `configs/sensor/`), a *path* to a YAML
+file, or a *mapping* of plain values that overrides the section's default file. Each number's
+unit is in its name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+Range = tuple[float, float]
+Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Family = Literal["sunny_road", "overcast_street", "garage", "tunnel", "night_road"]
+FAMILIES: tuple[Family, ...] = ("sunny_road", "overcast_street", "garage", "tunnel", "night_road")
+
+
+class ConfigError(ValueError):
+    """A configuration that cannot be used; the message names field, value and expectation."""
+
+
+class Section(BaseModel):
+    """Base of every section: frozen, and unknown keys are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+def check_range(name: str, bounds: Range) -> None:
+    """Raise ValueError unless `bounds` is (low, high) with low <= high."""
+    low, high = bounds
+    if not low <= high:
+        raise ValueError(f"{name} is ({low:g}, {high:g}); expected low <= high")
+
+
+class SensorConfig(Section):
+    """The imager: optics, pixel, converter, timing. Every source is named in the YAML file."""
+
+    name: str = Field(description="name of the imager")
+    f1_hz: Positive = Field(24e6, description="first modulation frequency, Hz")
+    f2_hz: Positive = Field(10e6, description="second modulation frequency, Hz")
+    sample_period_s: Positive = Field(3.85e-3, description="time from one DCS to the next, s")
+    integration_s: Range = Field((3e-4, 1e-3), description="integration time drawn per drive, s")
+    wavelength_nm: Positive = Field(940.0, description="laser wavelength, nm")
+    f_number: Positive = Field(1.2, description="lens f-number")
+    lens_transmission: Fraction = Field(0.8, description="lens and filter transmission")
+    pixel_pitch_m: Positive = Field(20e-6, description="pixel pitch, m")
+    fill_factor: Fraction = Field(1.0, description="light-sensitive share of a pixel")
+    quantum_efficiency: Fraction = Field(0.28, description="electrons per photon in band")
+    contrast: Fraction = Field(0.85, description="demodulation contrast m")
+    read_noise_e: NonNegative = Field(83.0, description="read noise of one tap, electrons rms")
+    full_well_e: Positive = Field(160e3, description="full well of one tap, electrons")
+    gain_lsb_per_e: Positive = Field(0.0128, description="converter gain, LSB per electron")
+    adc_bits: int = Field(12, ge=8, le=16, description="bits of the converter")
+    offset_std_lsb: NonNegative = Field(17.6, description="std of the tap offset pattern, LSB")
+    offset_row_share: Fraction = Field(0.5, description="share of offset variance common to a row")
+    offset_calibrated_share: Fraction = Field(
+        0.95, description="share of the pattern removed by the stored dark-offset map"
+    )
+    offset_ambient_lsb: NonNegative = Field(
+        8.0, description="row-parity offset that ambient adds at a full tap, LSB"
+    )
+    gray_max_exposure_s: Positive = Field(5e-3, description="longest gray exposure, s")
+    gray_target: Fraction = Field(0.3, description="mean of full scale aimed at by gray exposure")
+    min_snr: NonNegative = Field(1.0, description="signal-to-noise below which depth is invalid")
+    saturation_range_m: Positive = Field(
+        6.2, description="d_sat of eq. 6 and 8: wrapped distances from here on are not trusted, m"
+    )
+    max_range_m: Positive = Field(25.0, description="range that is unwrapped and scored, m")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> SensorConfig:
+        check_range("integration_s", self.integration_s)
+        if self.f2_hz >= self.f1_hz:
+            raise ValueError(f"f2_hz is {self.f2_hz:g}; expected less than f1_hz = {self.f1_hz:g}")
+        if self.integration_s[0] <= 0 or self.integration_s[1] >= self.sample_period_s:
+            raise ValueError(
+                f"integration_s is {self.integration_s}; expected 0 < t < sample_period_s = "
+                f"{self.sample_period_s:g} s"
+            )
+        return self
+
+
+class LaserConfig(Section):
+    """The light source: power, efficiency, electronics, heat and the trip."""
+
+    name: str = Field(description="name of the light source")
+    optical_power_w: Range = Field((4.0, 10.0), description="mean optical power while on, W")
+    efficiency: Fraction = Field(0.42, gt=0.0, description="optical over electrical power at 25 C")
+    driver_power_w: NonNegative = Field(2.1, description="modulation driver while integrating, W")
+    readout_energy_j: NonNegative = Field(0.26e-3, description="energy of one readout, J")
+    static_power_w: NonNegative = Field(62e-3, description="static power of the imager, W")
+    energy_per_mac_j: NonNegative = Field(1e-12, description="network energy per MAC, J")
+    thermal_resistance_k_per_w: Positive = Field(20.0, description="package to ambient, K/W")
+    thermal_time_constant_s: Positive = Field(10.0, description="R times C, s")
+    ambient_k: Range = Field((293.15, 313.15), description="ambient temperature per drive, K")
+    trip_k: Positive = Field(330.0, description="laser switches off at this temperature, K")
+    release_k: Positive = Field(325.0, description="laser comes back below this temperature, K")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> LaserConfig:
+        check_range("optical_power_w", self.optical_power_w)
+        check_range("ambient_k", self.ambient_k)
+        if not self.ambient_k[1] < self.release_k < self.trip_k:
+            raise ValueError(
+                f"release_k is {self.release_k:g}; expected above the hottest ambient_k "
+                f"{self.ambient_k[1]:g} and below trip_k {self.trip_k:g}"
+            )
+        return self
+
+
+class CameraConfig(Section):
+    """Image geometry and the instants that are rendered."""
+
+    width: int = Field(160, ge=16, le=1280, description="pixels across")
+    height: int = Field(120, ge=16, le=960, description="pixels down")
+    horizontal_fov_deg: float = Field(60.0, gt=5, lt=150, description="horizontal field of view")
+    samples_per_pixel: int = Field(4, ge=1, description="camera rays per pixel and instant")
+    gray_instants: int = Field(4, ge=1, le=16, description="instants that make the gray image")
+    bounces: int = Field(2, ge=1, le=8, description="surface hits of a light path")
+
+
+class WorldConfig(Section):
+    """Which worlds are drawn and how a clip moves through them."""
+
+    families: tuple[Family, ...] = Field(FAMILIES, min_length=1, description="scene families")
+    speed_m_s: Range = Field((0.0, 15.0), description="ego speed, m/s")
+    frame_rate_hz: Positive = Field(10.0, description="frames per second of a clip")
+    frames_per_clip: int = Field(16, ge=1, le=4096, description="frames of one clip")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> WorldConfig:
+        check_range("speed_m_s", self.speed_m_s)
+        return self
+
+
+class BankConfig(Section):
+    """A bank of rendered clips: which worlds, how many of each family per split."""
+
+    name: str = Field(description="name of the bank and of its folder in the cache")
+    sensor: SensorConfig
+    camera: CameraConfig = CameraConfig()
+    world: WorldConfig = WorldConfig()
+    seed: int = Field(0, ge=0, description="first world seed; clip i has seed + i")
+    train_clips: int = Field(8, ge=0, description="training clips of each family")
+    validation_clips: int = Field(3, ge=0, description="validation clips of each family")
+    test_clips: int = Field(3, ge=0, description="test clips of each family")
+
+
+class RewardConfig(Section):
+    """Weights of the bounded reward terms: r = -(sum of weight times term)."""
+
+    error: NonNegative = Field(1.0, description="weight of the depth error term")
+    duty: NonNegative = Field(0.05, description="weight of laser duty relative to always-8")
+    power: NonNegative = Field(0.15, description="weight of power relative to always-8")
+    trip: NonNegative = Field(0.5, description="weight of a frame without laser")
+    error_scale_m: Positive = Field(
+        0.5, description="error at which a pixel's term |e| / (|e| + scale) is one half, m"
+    )
+
+
+class EnvConfig(Section):
+    """The decision problem."""
+
+    sensor: SensorConfig
+    laser: LaserConfig
+    bank: str = Field("starter", description="name or path of a bank")
+    split: Literal["train", "validation", "test", "all"] = Field(
+        "train", description="clips that drives are made of"
+    )
+    unwrapper: str = Field("tofregnet", description="name or path of an unwrapping network")
+    merge: Literal["nearest", "floor"] = Field(
+        "nearest", description="how prediction and wrapped map merge: ours, or eq. 6"
+    )
+    observation: Literal["features", "image"] = Field("features", description="what is observed")
+    frames_per_drive: int = Field(256, ge=2, description="frames of one episode")
+    frame_rate_hz: Positive = Field(10.0, description="frames per second")
+    reward: RewardConfig = RewardConfig()
+
+    @model_validator(mode="after")
+    def _fits_the_frame(self) -> EnvConfig:
+        frame_s = 1.0 / self.frame_rate_hz
+        acquisition_s = 8 * self.sensor.sample_period_s
+        if acquisition_s > frame_s:
+            raise ValueError(
+                f"frame_rate_hz is {self.frame_rate_hz:g}: eight samples take {acquisition_s:g} s, "
+                f"more than the frame period of {frame_s:g} s"
+            )
+        return self
+
+
+class TrainUnwrapConfig(Section):
+    """Training of an unwrapping network."""
+
+    network: Literal["tofregnet", "tofsegnet"] = Field("tofregnet", description="which network")
+    bank: str = Field("training", description="name or path of the bank to train on")
+    width: int = Field(32, ge=4, le=128, description="channels of the first ResNet stage")
+    epochs: int = Field(60, ge=1, description="passes over the training clips")
+    batch_size: int = Field(32, ge=1, description="frames per step")
+    learning_rate: Positive = Field(1e-3, description="highest learning rate")
+    final_learning_rate: NonNegative = Field(1e-5, description="learning rate at the last step")
+    seed: int = Field(0, ge=0, description="seed of weights, order and augmentation")
+
+
+class AgentConfig(Section):
+    """Training of a scheduler with PPO."""
+
+    algorithm: Literal["ppo"] = Field("ppo", description="stable-baselines3 algorithm")
+    total_steps: int = Field(100_000, ge=1, description="environment steps in all")
+    num_envs: int = Field(16, ge=1, description="environments in the batch")
+    rollout_steps: int = Field(128, ge=2, description="steps of each environment per update")
+    batch_size: int = Field(512, ge=2, description="steps per gradient batch")
+    epochs: int = Field(10, ge=1, description="passes over a rollout")
+    learning_rate: Positive = Field(1e-3, description="Adam learning rate")
+    gamma: Fraction = Field(0.98, description="discount per frame")
+    gae_lambda: Fraction = Field(0.95, description="lambda of the advantage estimate")
+    entropy_coefficient: NonNegative = Field(0.005, description="weight of the policy's entropy")
+    hidden: tuple[int, ...] = Field((64, 64), description="hidden layers of policy and value")
+    seed: int = Field(0, ge=0, description="seed of weights and drives")
+
+
+class StudyConfig(Section):
+    """Evaluation: which drives and how many bootstrap draws."""
+
+    drives: int = Field(24, ge=2, description="test drives, the same for every policy")
+    tuning_drives: int = Field(12, ge=2, description="validation drives that tune the rule")
+    seed: int = Field(1000, ge=0, description="seed of the first drive")
+    bootstrap_draws: int = Field(10_000, ge=100, description="resamples of each interval")
+    confidence: float = Field(0.95, gt=0.5, lt=1.0, description="coverage of each interval")
+
+
+class DemoConfig(Section):
+    """The main job, small."""
+
+    env: EnvConfig
+    agent: AgentConfig
+    study: StudyConfig
+
+
+Model = TypeVar("Model", bound=Section)
+
+
+def configs_dir() -> Path:
+    """Folder of the shipped YAML files: beside the package in a checkout, inside it in a wheel."""
+    inside = Path(__file__).parent / "configs"
+    return inside if inside.is_dir() else Path(__file__).parents[1] / "configs"
+
+
+def find_config(section: str, name: str) -> Path:
+    """File of configuration `name` (a name in `configs/<section>/`, or a path).
+
+    Raises
+    ------
+    ConfigError
+        There is no such name and no such file.
+    """
+    shipped = configs_dir() / section
+    for candidate in (shipped / f"{name}.yaml", Path(name)):
+        if candidate.is_file():
+            return candidate
+    known = ", ".join(sorted(path.stem for path in shipped.glob("*.yaml"))) or "none"
+    raise ConfigError(f"{section} is {name!r}; expected one of {known}, or the path of a YAML file")
+
+
+def read_config(model: type[Model], path: Path, overrides: Sequence[str] = ()) -> Model:
+    """Read `path` into `model`; `overrides` are command-line words such as `--reward.power 0.3`.
+
+    Raises
+    ------
+    ConfigError
+        An unknown key, a wrong type or a value out of range; the message names the key.
+    """
+    import jsonargparse
+
+    parser = jsonargparse.ArgumentParser(exit_on_error=False)
+    parser.add_class_arguments(model, "config", sub_configs=True)
+    words = [_under(word, "config") for word in overrides]
+    try:
+        return parser.instantiate(parser.parse_args(["--config", str(path), *words])).config
+    except (jsonargparse.ArgumentError, ValueError, TypeError, OSError) as error:
+        raise ConfigError(f"{path.name}: {one_sentence(error)}") from None
+
+
+def _under(word: str, group: str) -> str:
+    return f"--{group}.{word[2:]}" if word.startswith("--") else word
+
+
+def one_sentence(error: Exception) -> str:
+    """What a validation error says, on one line, without the library's own advertising."""
+    if isinstance(error, ValidationError):
+        return "; ".join(_describe(detail) for detail in error.errors())
+    kept = [line.strip() for line in str(error).splitlines() if "errors.pydantic.dev" not in line]
+    return " ".join(" ".join(kept).replace("config.", "").split())
+
+
+def _describe(detail: Any) -> str:
+    where = ".".join(str(part) for part in detail["loc"]) or "configuration"
+    message = detail["msg"].removeprefix("Value error, ")
+    if detail["type"] == "extra_forbidden":
+        return f"unknown key {where}"
+    return f"{where}: {message}, got {detail['input']!r}" if detail["loc"] else message
+
+
+def merged(base: Model, changes: Mapping[str, Any]) -> Model:
+    """`base` with the (possibly nested) plain values of `changes`, validated again.
+
+    Raises
+    ------
+    ConfigError
+        An unknown key, a wrong type or a value out of range; the message names the key.
+    """
+    try:
+        return type(base).model_validate(_overlay(base.model_dump(), changes))
+    except ValidationError as error:
+        raise ConfigError(one_sentence(error)) from None
+
+
+def _overlay(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    result = dict(base)
+    for key, value in changes.items():
+        nested = isinstance(value, Mapping) and isinstance(result.get(key), Mapping)
+        result[key] = _overlay(result[key], value) if nested else value
+    return result

@@ -1,0 +1,1 @@
+"""A world becomes light, with Mitsuba. The only room that imports mitsuba or drjit."""

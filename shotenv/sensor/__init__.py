@@ -1,0 +1,1 @@
+"""Light becomes electrons, noise and converter words."""

@@ -1,0 +1,1 @@
+"""A seed becomes a world: geometry, materials, lights, motion. Knows no renderer."""

@@ -1,0 +1,135 @@
+"""What a world is made of: triangles with materials, things that move, lights, an ego path.
+
+Axes: x ahead, y left, z up; metres, seconds, radians. Radiometry is inside the sensor's optical
+band: irradiance W m-2, radiance W m-2 sr-1, radiant intensity W sr-1. No renderer is known here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shotenv.config import Family
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A triangle soup with one material per face. F faces, corners not shared.
+
+    Attributes
+    ----------
+    corners : float32 [F, 3, 3]
+        Corner positions, metres.
+    uv : float32 [F, 3, 2]
+        Texture coordinates; the noise texture repeats every 1.0.
+    albedo_low, albedo_high : float32 [F]
+        Diffuse albedo in band where the noise texture is 0 and where it is 1.
+    retro : float32 [F]
+        Retro-reflection of the co-located laser, times the Lambertian return; 0 for most.
+    emission : float32 [F]
+        Radiance that the camera sees on the face itself, W m-2 sr-1 (lamps; their light on
+        other things comes from `Lamp`).
+    """
+
+    corners: np.ndarray
+    uv: np.ndarray
+    albedo_low: np.ndarray
+    albedo_high: np.ndarray
+    retro: np.ndarray
+    emission: np.ndarray
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Position (x, y, z) in metres and heading about z in radians, pitch about y in radians."""
+
+    position_m: tuple[float, float, float]
+    yaw_rad: float = 0.0
+    pitch_rad: float = 0.0
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Constant speed on an arc: the pose at time t from the pose at time 0.
+
+    A person's or a car's path over a clip of a few seconds; yaw rate 0 is a straight line.
+    """
+
+    start: Pose
+    speed_m_s: float = 0.0
+    yaw_rate_rad_s: float = 0.0
+
+    def at(self, time_s: float) -> Pose:
+        """Pose at `time_s`."""
+        turned = self.yaw_rate_rad_s * time_s
+        # Chord of the arc: length speed * t * sinc(turn / 2), direction start yaw + turn / 2.
+        chord = self.speed_m_s * time_s * float(np.sinc(turned / (2 * np.pi)))
+        heading = self.start.yaw_rad + turned / 2
+        x, y, z = self.start.position_m
+        moved = (x + chord * float(np.cos(heading)), y + chord * float(np.sin(heading)), z)
+        return Pose(moved, self.start.yaw_rad + turned, self.start.pitch_rad)
+
+
+@dataclass(frozen=True)
+class MovingObject:
+    """A mesh in its own coordinates (standing on z = 0, facing +x) and its path."""
+
+    mesh: Mesh
+    motion: Motion
+
+
+@dataclass(frozen=True)
+class Lamp:
+    """A small lamp that lights other things (a street lamp, a head light, a ceiling tube).
+
+    Irradiance at distance d in direction w: intensity * falloff(angle) / (d^2 + radius_m^2); the
+    radius keeps it finite close by. `cutoff_cos` = -1 shines everywhere; otherwise the intensity
+    falls smoothly to 0 at that cosine from `direction`. `rides` lamps move with the camera.
+    """
+
+    position_m: tuple[float, float, float]
+    intensity_w_sr: float
+    radius_m: float = 0.1
+    direction: tuple[float, float, float] = (0.0, 0.0, -1.0)
+    cutoff_cos: float = -1.0
+    rides: bool = False
+
+
+@dataclass(frozen=True)
+class Light:
+    """All passive light in band.
+
+    Attributes
+    ----------
+    sun_irradiance : float
+        On a surface facing the sun, W m-2; 0 where there is no direct sun.
+    sun_direction : (x, y, z)
+        Unit vector towards the sun.
+    sky_zenith, sky_horizon : float
+        Sky radiance overhead and at the horizon, W m-2 sr-1, linear in the sine of elevation.
+    lamps : tuple of Lamp
+        At most `MAX_LAMPS`.
+    """
+
+    sun_irradiance: float
+    sun_direction: tuple[float, float, float]
+    sky_zenith: float
+    sky_horizon: float
+    lamps: tuple[Lamp, ...]
+
+
+MAX_LAMPS = 16
+
+
+@dataclass(frozen=True)
+class World:
+    """Everything a clip of frames is rendered from; drawn from `seed` and `family` alone."""
+
+    family: Family
+    seed: int
+    static: Mesh
+    moving: tuple[MovingObject, ...]
+    light: Light
+    ego: Motion
+    """Path of the camera, its height in z, looking along +x of its own heading."""
