@@ -1,1 +1,40 @@
-"""Sequences of frames on disk."""
+"""Sequences of frames on disk.
+
+`open_bank("starter")` opens a bank by the name of its configuration and renders it into the
+user's cache folder on first use; `open_bank("path/to/bank")` opens a folder.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from shotenv.bank.reader import Bank, BankFrame, Clip
+from shotenv.bank.store import MANIFEST, BankError
+from shotenv.config import BankConfig, ConfigError, find_config, read_config
+
+__all__ = ["Bank", "BankError", "BankFrame", "Clip", "open_bank"]
+
+
+def open_bank(bank: str | Path) -> Bank:
+    """Open a bank by name or path.
+
+    Parameters
+    ----------
+    bank
+        A folder that holds a bank, or a configuration: a name in `configs/bank/` or the path of
+        a YAML file. A configured bank is rendered first where it does not stand yet.
+
+    Raises
+    ------
+    BankError
+        Neither a bank nor a configuration, or a damaged bank; the message names file and cure.
+    """
+    if Path(bank).is_dir() and (Path(bank) / MANIFEST).is_file():
+        return Bank(Path(bank))
+    try:
+        path = find_config("bank", str(bank))
+    except ConfigError as error:
+        raise BankError(f"{error}, or of the folder of a bank") from None
+    from shotenv.bank.build import build_bank
+
+    return Bank(build_bank(read_config(BankConfig, path)))

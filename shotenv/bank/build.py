@@ -1,0 +1,245 @@
+"""Render a bank: worlds from seeds, light from worlds, clips on disk; interruptible, resumable."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from filelock import FileLock
+from tqdm import tqdm
+
+from shotenv.bank.store import (
+    ARRAYS,
+    MANIFEST,
+    BankError,
+    ClipRecord,
+    Split,
+    frame_bytes,
+    read_clip_record,
+    write_clip,
+    write_json,
+    write_manifest,
+)
+from shotenv.config import BankConfig, Family
+
+RENDERING_VERSION = 1
+"""Raised when the same configuration would give other light: old banks are then left alone."""
+
+SECONDS_PER_MILLION_RAYS = 0.3
+"""Camera rays with two bounces, one core, measured; only used to announce a duration."""
+
+CLIPS_PER_WORKER = 16
+
+
+@dataclass(frozen=True)
+class ClipJob:
+    """Everything a worker needs to render one clip."""
+
+    config: BankConfig
+    name: str
+    family: Family
+    seed: int
+    split: Split
+    folder: Path
+
+
+def clip_jobs(config: BankConfig, folder: Path) -> tuple[ClipJob, ...]:
+    """Clips of a bank in their order: split by split, family by family."""
+    counts: dict[Split, int] = {
+        "train": config.train_clips,
+        "validation": config.validation_clips,
+        "test": config.test_clips,
+    }
+    kinds = [
+        (split, family)
+        for split, count in counts.items()
+        for _ in range(count)
+        for family in config.world.families
+    ]
+    return tuple(
+        _job(config, folder, number, split, family) for number, (split, family) in enumerate(kinds)
+    )
+
+
+def _job(config: BankConfig, folder: Path, number: int, split: Split, family: Family) -> ClipJob:
+    name = f"{number:05d}-{family}"
+    return ClipJob(config, name, family, config.seed + number, split, folder / "clips" / name)
+
+
+def cache_dir() -> Path:
+    """Folder of rendered banks and kept predictions: SHOTENV_CACHE, or the user's cache folder."""
+    import platformdirs
+
+    return Path(os.environ.get("SHOTENV_CACHE") or platformdirs.user_cache_path("shotenv"))
+
+
+def bank_folder(config: BankConfig) -> Path:
+    """Where the bank of `config` lies; another configuration lies elsewhere."""
+    content = json.dumps([RENDERING_VERSION, config.model_dump(mode="json")], sort_keys=True)
+    return (
+        cache_dir() / "banks" / f"{config.name}-{hashlib.sha256(content.encode()).hexdigest()[:8]}"
+    )
+
+
+def build_bank(
+    config: BankConfig, folder: Path | None = None, *, workers: int | None = None
+) -> Path:
+    """Render the bank of `config` and return its folder; clips that already stand are kept.
+
+    Parameters
+    ----------
+    folder
+        Where to; the user's cache folder by default.
+    workers
+        Rendering processes; one per core by default.
+
+    Raises
+    ------
+    BankError
+        `folder` holds another bank, or the disk has no room.
+    shotenv.render.RendererError
+        No usable LLVM library, or a worker died.
+    """
+    folder = bank_folder(config) if folder is None else Path(folder)
+    if (folder / MANIFEST).is_file() and _same_config(folder, config):
+        return folder
+    _make_folder(folder)
+    with FileLock(folder / ".lock"):
+        _claim(folder, config)
+        jobs = clip_jobs(config, folder)
+        missing = [job for job in jobs if read_clip_record(job.folder) is None]
+        _announce(config, folder, len(jobs), len(missing))
+        _render(missing, config, workers or len(os.sched_getaffinity(0)))
+        size = (config.camera.height, config.camera.width)
+        write_manifest(folder, config.name, _records(jobs), size, config)
+    return folder
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        (folder / "clips").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BankError(
+            f"cannot create {folder}: {error.strerror}; choose another cache folder "
+            "with SHOTENV_CACHE"
+        ) from None
+
+
+def _identity(config: BankConfig) -> dict:
+    return {"rendering_version": RENDERING_VERSION, "config": config.model_dump(mode="json")}
+
+
+def _same_config(folder: Path, config: BankConfig) -> bool:
+    path = folder / "source.json"
+    return path.is_file() and json.loads(path.read_text()) == _identity(config)
+
+
+def _claim(folder: Path, config: BankConfig) -> None:
+    """Mark the folder as this configuration's, or refuse when it is another's."""
+    path = folder / "source.json"
+    if not path.is_file():
+        if any((folder / "clips").iterdir()):
+            raise BankError(f"{folder} holds clips of unknown origin; choose another folder")
+        write_json(path, _identity(config))
+    elif not _same_config(folder, config):
+        raise BankError(f"{folder} holds a bank of another configuration; choose another folder")
+    for leftover in (folder / "clips").glob(".*"):
+        shutil.rmtree(leftover, ignore_errors=True)
+
+
+def _announce(config: BankConfig, folder: Path, clips: int, missing: int) -> None:
+    camera, frames = config.camera, missing * config.world.frames_per_clip
+    needed = frames * frame_bytes(camera.height, camera.width)
+    free = shutil.disk_usage(folder).free
+    if needed * 1.05 > free:
+        raise BankError(
+            f"{folder} needs {needed / 1e9:.2f} GB but the disk has {free / 1e9:.2f} GB "
+            "free; free space or choose another cache folder with SHOTENV_CACHE"
+        )
+    rays = frames * camera.height * camera.width * camera.samples_per_pixel
+    rays *= 8 + camera.gray_instants
+    cores = len(os.sched_getaffinity(0))
+    minutes = rays / 1e6 * SECONDS_PER_MILLION_RAYS * camera.bounces / 2 / cores / 60
+    print(
+        f"Rendering bank '{config.name}' into {folder}: {missing} of {clips} clips, "
+        f"{frames} frames, {needed / 1e6:.0f} MB, about {max(minutes, 0.1):.1f} minutes on "
+        f"{cores} cores. It can be interrupted; the next start continues.",
+        file=sys.stderr,
+        flush=True,
+    )
+
+
+def _render(jobs: Sequence[ClipJob], config: BankConfig, workers: int) -> None:
+    if not jobs:
+        return
+    from shotenv.render.llvm import require_llvm
+    from shotenv.render.workers import run_jobs
+
+    require_llvm()
+    frames = config.world.frames_per_clip
+    with tqdm(
+        total=len(jobs) * frames, unit="frame", desc="rendering", mininterval=1.0, maxinterval=5.0
+    ) as bar:
+        for _ in run_jobs(render_clip, jobs, workers=workers, jobs_per_worker=CLIPS_PER_WORKER):
+            bar.update(frames)
+
+
+def render_clip(job: ClipJob) -> str:
+    """Render one clip and write it; returns its name. Runs in a worker process."""
+    from shotenv.render import render_frame
+    from shotenv.world import draw_world
+
+    config = job.config
+    world = draw_world(job.family, job.seed, config.world)
+    times = np.arange(config.world.frames_per_clip) / config.world.frame_rate_hz
+    rendered = [
+        render_frame(world, float(time), config.camera, config.sensor, seed=_seed(job.seed, number))
+        for number, time in enumerate(times)
+    ]
+    light = {
+        name: np.stack([getattr(frame, name) for frame in rendered])
+        for name in ARRAYS
+        if name != "gray"
+    }
+    gray, exposure_s = _capture(light["ambient"], job)
+    constant = np.ones(len(times))
+    metadata = {
+        "name": job.name,
+        "family": job.family,
+        "seed": job.seed,
+        "split": job.split,
+        "time_s": times.tolist(),
+        "ego_speed_m_s": (constant * world.ego.speed_m_s).tolist(),
+        "yaw_rate_rad_s": (constant * world.ego.yaw_rate_rad_s).tolist(),
+        "gray_exposure_s": exposure_s,
+    }
+    write_clip(job.folder, {**light, "gray": gray}, metadata)
+    return job.name
+
+
+def _capture(ambient: np.ndarray, job: ClipJob) -> tuple[np.ndarray, list[float]]:
+    """Gray images of a clip; the noise belongs to the bank, so that predictions can be kept."""
+    from shotenv.sensor import capture_gray
+
+    generator = torch.Generator().manual_seed(_seed(job.seed, -1))
+    noise = torch.randn(ambient.shape, generator=generator)
+    gray, exposure_s = capture_gray(torch.from_numpy(ambient), job.config.sensor, noise=noise)
+    return gray.numpy().astype(np.uint16), exposure_s.tolist()
+
+
+def _seed(clip_seed: int, number: int) -> int:
+    """A 32-bit seed of its own for each frame of each clip."""
+    return int(np.random.SeedSequence([clip_seed, number + 1]).generate_state(1)[0])
+
+
+def _records(jobs: Sequence[ClipJob]) -> list[ClipRecord]:
+    records = [read_clip_record(job.folder) for job in jobs]
+    return [record for record in records if record is not None]

@@ -1,0 +1,176 @@
+"""A bank, open for reading: memory-mapped, indexed by frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from shotenv.bank.store import ARRAYS, BankError, Manifest, Split, read_manifest
+from shotenv.frames import Exposure
+
+OPEN_CLIPS = 128
+"""Clips kept mapped at a time; each holds one file descriptor per array."""
+
+
+@dataclass(frozen=True)
+class Clip:
+    """A run of consecutive frames: `start` is the bank index of the first."""
+
+    name: str
+    family: str
+    seed: int
+    split: Split
+    start: int
+    frames: int
+
+
+@dataclass(frozen=True)
+class BankFrame:
+    """One frame with everything the bank knows about it.
+
+    Attributes
+    ----------
+    exposure : Exposure
+        Batch of one.
+    gray : uint16 [H, W]
+        Passive gray image, 12 bits.
+    clip : Clip
+        Where the frame belongs.
+    time_s, ego_speed_m_s, yaw_rate_rad_s, gray_exposure_s : float
+        Time in the clip, ego motion, exposure time of the gray image.
+    """
+
+    exposure: Exposure
+    gray: Tensor
+    clip: Clip
+    time_s: float
+    ego_speed_m_s: float
+    yaw_rate_rad_s: float
+    gray_exposure_s: float
+
+
+class Bank:
+    """Frames of many clips, indexed 0..len-1, clip after clip.
+
+    Examples
+    --------
+    >>> bank = open_bank("starter")                                     # doctest: +SKIP
+    >>> bank.frame(0).exposure.distance_m.shape                         # doctest: +SKIP
+    torch.Size([1, 120, 160])
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = Path(folder).resolve()
+        self.manifest: Manifest = read_manifest(self.folder)
+        self.clips = _clips(self.manifest)
+        self._clip_of_frame = np.repeat(np.arange(len(self.clips)), [c.frames for c in self.clips])
+        self._map = lru_cache(maxsize=OPEN_CLIPS)(self._map_clip)
+        self.time_s = self._per_frame("time_s")
+        self.ego_speed_m_s = self._per_frame("ego_speed_m_s")
+        self.yaw_rate_rad_s = self._per_frame("yaw_rate_rad_s")
+        self.gray_exposure_s = self._per_frame("gray_exposure_s")
+
+    def __reduce__(self):
+        return (type(self), (self.folder,))
+
+    def __len__(self) -> int:
+        return len(self._clip_of_frame)
+
+    @property
+    def config(self):
+        """Configuration the bank was rendered from, or None for an imported one."""
+        return self.manifest.config
+
+    @property
+    def height(self) -> int:
+        """Pixels down."""
+        return self.manifest.height
+
+    @property
+    def width(self) -> int:
+        """Pixels across."""
+        return self.manifest.width
+
+    @property
+    def fingerprint(self) -> str:
+        """Changes when any array of the bank changes."""
+        return self.manifest.fingerprint
+
+    def splits(self, split: str) -> tuple[Clip, ...]:
+        """Clips of one split; "all" gives every clip.
+
+        Raises
+        ------
+        BankError
+            The bank has no clip in that split.
+        """
+        chosen = tuple(clip for clip in self.clips if split in (clip.split, "all"))
+        if not chosen:
+            known = sorted({clip.split for clip in self.clips})
+            raise BankError(f"split is {split!r}, but bank {self.folder} only has {known}")
+        return chosen
+
+    def clip_of(self, index: int) -> Clip:
+        """Clip that frame `index` belongs to."""
+        return self.clips[self._clip_of_frame[self._checked(index)]]
+
+    def frame(self, index: int) -> BankFrame:
+        """Frame `index` with its metadata; IndexError outside 0..len-1."""
+        index = self._checked(index)
+        one = torch.tensor([index])
+        return BankFrame(
+            exposure=self.exposure(one),
+            gray=self.gray(one)[0],
+            clip=self.clip_of(index),
+            time_s=float(self.time_s[index]),
+            ego_speed_m_s=float(self.ego_speed_m_s[index]),
+            yaw_rate_rad_s=float(self.yaw_rate_rad_s[index]),
+            gray_exposure_s=float(self.gray_exposure_s[index]),
+        )
+
+    def exposure(self, indices: Tensor) -> Exposure:
+        """Noise-free light of the frames `indices` [B]."""
+        return Exposure(**{name: self._gather(name, indices) for name in ARRAYS if name != "gray"})
+
+    def gray(self, indices: Tensor) -> Tensor:
+        """Gray images uint16 [B, H, W] of the frames `indices` [B]."""
+        return self._gather("gray", indices)
+
+    def _gather(self, name: str, indices: Tensor) -> Tensor:
+        frames = [self._frame_array(name, index) for index in indices.tolist()]
+        return frames[0][None] if len(frames) == 1 else torch.stack(frames)
+
+    def _frame_array(self, name: str, index: int) -> Tensor:
+        clip = int(self._clip_of_frame[index])
+        return self._map(clip)[name][index - self.clips[clip].start]
+
+    def _map_clip(self, clip: int) -> dict[str, Tensor]:
+        folder = self.folder / self.manifest.clips[clip].folder
+        # Copy-on-write: torch wants a writable array, and the file is never written to.
+        return {
+            name: torch.from_numpy(
+                np.load(folder / f"{name}.npy", mmap_mode="c", allow_pickle=False)
+            )
+            for name in ARRAYS
+        }
+
+    def _per_frame(self, field: str) -> np.ndarray:
+        return np.concatenate([np.asarray(getattr(clip, field)) for clip in self.manifest.clips])
+
+    def _checked(self, index: int) -> int:
+        if not 0 <= index < len(self):
+            raise IndexError(f"frame index is {index}; expected 0..{len(self) - 1}")
+        return index
+
+
+def _clips(manifest: Manifest) -> tuple[Clip, ...]:
+    starts = np.cumsum([0] + [clip.frames for clip in manifest.clips]).tolist()
+    return tuple(
+        Clip(c.name, c.family, c.seed, c.split, start, c.frames)
+        for c, start in zip(manifest.clips, starts, strict=False)
+    )
