@@ -36,7 +36,8 @@ RENDERING_VERSION = 1
 SECONDS_PER_MILLION_RAYS = 0.3
 """Camera rays with two bounces, one core, measured; only used to announce a duration."""
 
-CLIPS_PER_WORKER = 16
+FRAMES_PER_WORKER = 512
+"""Rendered frames after which a worker process is replaced: rebuilding scenes leaks memory."""
 
 
 @dataclass(frozen=True)
@@ -188,7 +189,8 @@ def _render(jobs: Sequence[ClipJob], config: BankConfig, workers: int) -> None:
     with tqdm(
         total=len(jobs) * frames, unit="frame", desc="rendering", mininterval=1.0, maxinterval=5.0
     ) as bar:
-        for _ in run_jobs(render_clip, jobs, workers=workers, jobs_per_worker=CLIPS_PER_WORKER):
+        jobs_per_worker = max(1, FRAMES_PER_WORKER // frames)
+        for _ in run_jobs(render_clip, jobs, workers=workers, jobs_per_worker=jobs_per_worker):
             bar.update(frames)
 
 
