@@ -1,1 +1,21 @@
 """Light becomes electrons, noise and converter words."""
+
+from shotenv.sensor.acquire import collected_electrons, expose, single_sample_snr
+from shotenv.sensor.electrons import electrons_per_radiance_second
+from shotenv.sensor.gray import capture_gray
+from shotenv.sensor.noise import Purpose, draw_noise, stream, stream_seed
+from shotenv.sensor.offsets import OffsetPattern, draw_offsets
+
+__all__ = [
+    "OffsetPattern",
+    "Purpose",
+    "capture_gray",
+    "collected_electrons",
+    "draw_noise",
+    "draw_offsets",
+    "electrons_per_radiance_second",
+    "expose",
+    "single_sample_snr",
+    "stream",
+    "stream_seed",
+]

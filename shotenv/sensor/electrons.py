@@ -1,0 +1,69 @@
+"""Light to electrons, with the noise and the limits of a charge packet.
+
+Each function is one effect; a parameter at zero (or an infinite full well) switches it off.
+"""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+
+from shotenv.config import SensorConfig
+
+PLANCK_J_S = 6.62607015e-34
+SPEED_OF_LIGHT_M_S = 299_792_458.0
+TAP_SIGNS = (1.0, -1.0)
+
+
+def photon_energy_j(wavelength_nm: float) -> float:
+    """Energy h c / lambda of one photon, joules."""
+    return PLANCK_J_S * SPEED_OF_LIGHT_M_S / (wavelength_nm * 1e-9)
+
+
+def electrons_per_radiance_second(sensor: SensorConfig) -> float:
+    """Electrons that a pixel collects in one second from a radiance of 1 W m-2 sr-1.
+
+    Camera equation: the irradiance behind a lens of f-number N and transmission tau is
+    `pi L tau / (4 N^2)`; times light-sensitive area, over photon energy, times QE.
+    """
+    irradiance = math.pi * sensor.lens_transmission / (4.0 * sensor.f_number**2)
+    area_m2 = sensor.fill_factor * sensor.pixel_pitch_m**2
+    per_photon = sensor.quantum_efficiency / photon_energy_j(sensor.wavelength_nm)
+    return irradiance * area_m2 * per_photon
+
+
+def tap_electrons(total_e: Tensor, modulated_e: Tensor) -> Tensor:
+    """Mean charge of both taps, `(S + B) / 2 +- m C_k / 2`.
+
+    Parameters
+    ----------
+    total_e : [B, H, W]
+        Electrons over both taps in one sample, S + B.
+    modulated_e : [B, n, H, W]
+        Demodulated electrons m C_k of each sample.
+
+    Returns
+    -------
+    [B, n, 2, H, W]
+        Electrons of tap A and tap B, not negative.
+    """
+    half = 0.5 * modulated_e
+    mean = (0.5 * total_e).unsqueeze(1)
+    return torch.stack((mean + half, mean - half), dim=2).clamp_(min=0.0)
+
+
+def add_noise(charge_e: Tensor, normals: Tensor, read_noise_e: float) -> Tensor:
+    """Charge with shot and read noise: one normal per packet, variance `charge + read^2`.
+
+    The normal distribution stands for Poisson's: one variate per packet keeps the noise stream
+    in step whatever the light is.
+    """
+    sigma_e = (charge_e + read_noise_e**2).sqrt_()
+    return sigma_e.mul_(normals).add_(charge_e)
+
+
+def clip_to_full_well(charge_e: Tensor, full_well_e: float) -> Tensor:
+    """Charge limited to what a tap can hold and read, 0..full well, electrons."""
+    return charge_e.clamp(0.0, full_well_e)

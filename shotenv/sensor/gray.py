@@ -1,0 +1,55 @@
+"""The passive gray image: ambient light alone, exposure time by an ideal light meter."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from shotenv.config import SensorConfig
+from shotenv.sensor.converter import digitise, full_scale_lsb
+from shotenv.sensor.electrons import add_noise, clip_to_full_well, electrons_per_radiance_second
+
+SHORTEST_EXPOSURE_S = 1e-5
+
+
+def capture_gray(
+    ambient: Tensor, sensor: SensorConfig, *, noise: Tensor | None
+) -> tuple[Tensor, Tensor]:
+    """Gray image of the scene without laser.
+
+    Parameters
+    ----------
+    ambient : float32 [B, H, W]
+        Radiance inside the band filter, W m-2 sr-1.
+    sensor : SensorConfig
+        The imager; a full tap is the converter's full scale.
+    noise : float32 [B, H, W] or None
+        Standard normals; None leaves shot and read noise out.
+
+    Returns
+    -------
+    gray : int32 [B, H, W]
+        Words of the converter, 0..2^bits - 1.
+    exposure_s : float32 [B]
+        Exposure time of each image, seconds.
+    """
+    exposure_s = gray_exposure_s(ambient, sensor)
+    rate = electrons_per_radiance_second(sensor)
+    charge_e = ambient * (rate * exposure_s)[:, None, None]
+    if noise is not None:
+        charge_e = add_noise(charge_e, noise, sensor.read_noise_e)
+    charge_e = clip_to_full_well(charge_e, sensor.full_well_e)
+    top = full_scale_lsb(sensor.adc_bits)
+    return digitise(charge_e * gray_gain_lsb_per_e(sensor), 0, top).to(torch.int32), exposure_s
+
+
+def gray_exposure_s(ambient: Tensor, sensor: SensorConfig) -> Tensor:
+    """Exposure [B] that brings the mean to `gray_target` of full scale, within its limits, s."""
+    mean_rate_e_s = ambient.mean(dim=(-2, -1)) * electrons_per_radiance_second(sensor)
+    wanted_e = sensor.gray_target * sensor.full_well_e
+    return (wanted_e / mean_rate_e_s).clamp(SHORTEST_EXPOSURE_S, sensor.gray_max_exposure_s)
+
+
+def gray_gain_lsb_per_e(sensor: SensorConfig) -> float:
+    """Converter gain of the gray image: one full tap is full scale, LSB per electron."""
+    return full_scale_lsb(sensor.adc_bits) / sensor.full_well_e

@@ -1,0 +1,60 @@
+"""Random streams: who draws what from which seed. No stream depends on actions or on the batch."""
+
+from __future__ import annotations
+
+import enum
+
+import torch
+from torch import Tensor
+
+_MASK = (1 << 64) - 1
+
+
+class Purpose(enum.IntEnum):
+    """What a stream is drawn for; each purpose has its own."""
+
+    NOISE = 1
+    OFFSETS = 2
+    DRIVE = 3
+    GRAY = 4
+
+
+def stream_seed(purpose: Purpose, *words: int) -> int:
+    """63-bit seed of the stream named by `purpose` and `words` (SplitMix64's mixing, chained).
+
+    Neighbouring words give unrelated seeds, which a plain sum would not.
+    """
+    state = int(purpose)
+    for word in words:
+        state = _mix(state ^ (int(word) & _MASK))
+    return state >> 1
+
+
+def _mix(value: int) -> int:
+    # SplitMix64 (Steele, Lea, Flood 2014): golden-ratio increment and its finaliser.
+    value = (value + 0x9E3779B97F4A7C15) & _MASK
+    value = ((value ^ (value >> 30)) * 0xBF58476D1CE4E5B9) & _MASK
+    value = ((value ^ (value >> 27)) * 0x94D049BB133111EB) & _MASK
+    return value ^ (value >> 31)
+
+
+def stream(purpose: Purpose, *words: int) -> torch.Generator:
+    """Generator of the stream named by `purpose` and `words`."""
+    return torch.Generator().manual_seed(stream_seed(purpose, *words))
+
+
+def draw_noise(seed: int, frame: int, shots: int, height: int, width: int) -> Tensor:
+    """Standard normals of one acquisition: tap A and tap B of each sample.
+
+    The stream belongs to (seed, frame) and each sample is one call, so that the noise of fewer
+    shots is a prefix of the noise of more.
+
+    Returns
+    -------
+    float32 [shots, 2, height, width]
+    """
+    normals = torch.empty(int(shots), 2, height, width)
+    generator = stream(Purpose.NOISE, seed, frame)
+    for sample in normals:
+        sample.normal_(generator=generator)
+    return normals

@@ -1,0 +1,59 @@
+"""Fixed-pattern offset of the taps: seen by two samples, cancelled by four."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from shotenv.config import SensorConfig
+
+
+@dataclass(frozen=True)
+class OffsetPattern:
+    """Offset of every pixel of each sensor in the batch.
+
+    Attributes
+    ----------
+    pattern_lsb : float32 [B, H, W]
+        Added to every sample of the pixel.
+    calibrated_lsb : float32 [B, H, W]
+        The stored dark-offset map, which a decoder of two samples subtracts.
+    """
+
+    pattern_lsb: Tensor
+    calibrated_lsb: Tensor
+
+    def __getitem__(self, index) -> OffsetPattern:
+        """Sensors chosen by a batch index."""
+        return OffsetPattern(self.pattern_lsb[index], self.calibrated_lsb[index])
+
+
+def draw_offsets(
+    sensor: SensorConfig, height: int, width: int, *, generator: torch.Generator
+) -> OffsetPattern:
+    """Offset pattern of one sensor, batch of one: a part common to each row and a part per pixel.
+
+    `offset_row_share` of the variance is the row's. The stored map knows
+    `offset_calibrated_share` of the pattern.
+    """
+    row = torch.randn(height, 1, generator=generator)
+    pixel = torch.randn(height, width, generator=generator)
+    share = sensor.offset_row_share
+    unit = math.sqrt(share) * row + math.sqrt(1.0 - share) * pixel
+    pattern = (sensor.offset_std_lsb * unit).unsqueeze(0)
+    return OffsetPattern(pattern, sensor.offset_calibrated_share * pattern)
+
+
+def ambient_offset_lsb(ambient_e: Tensor, sensor: SensorConfig) -> Tensor:
+    """Offset that ambient light adds, of opposite sign in even and odd rows, LSB.
+
+    Linear in the ambient charge `ambient_e` [B, H, W] of both taps: `offset_ambient_lsb` where
+    ambient alone fills a tap, and no more.
+    """
+    filled = (0.5 / sensor.full_well_e * ambient_e).clamp_(max=1.0)
+    parity = torch.ones(ambient_e.shape[-2], 1, dtype=ambient_e.dtype, device=ambient_e.device)
+    parity[1::2] = -1.0
+    return filled.mul_(sensor.offset_ambient_lsb * parity)
