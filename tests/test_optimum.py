@@ -1,0 +1,103 @@
+import itertools
+
+import numpy as np
+import pytest
+
+from agents.optimum import (
+    DriveTable,
+    Situation,
+    blind_choices,
+    clairvoyant,
+    cycle,
+    fixed,
+    greedy,
+    mixture,
+    play,
+)
+
+TRIP_K, RELEASE_K, AMBIENT_K, DECAY = 330.0, 325.0, 300.0, 0.7
+
+
+def advance(temperature_k, tripped, heat_j):
+    """First-order package with a hysteretic trip; one joule heats by one kelvin."""
+    warm = AMBIENT_K + (temperature_k - AMBIENT_K) * DECAY + heat_j
+    return warm, np.where(tripped, warm > RELEASE_K, warm >= TRIP_K)
+
+
+def draw_table(seed, *, drives=6, frames=7, heat=(3.0, 8.0, 16.0)):
+    rng = np.random.default_rng(seed)
+    cost = rng.random((drives, frames, 3)) + np.array([0.5, 0.3, 0.0])
+    heat_j = np.broadcast_to(np.array(heat), cost.shape) * rng.uniform(0.8, 1.2, (drives, 1, 1))
+    return DriveTable(
+        cost, np.full((drives, frames), 3.0), heat_j, np.full(drives, 310.0), 400.0, advance
+    )
+
+
+def brute_force(table):
+    """Least cost of each drive over all action sequences, one at a time."""
+    drives, frames, actions = table.cost.shape
+    best = np.full(drives, np.inf)
+    for sequence in itertools.product(range(actions), repeat=frames):
+        best = np.minimum(best, play(table, lambda now, s=sequence: repeat(s[now.frame], now)).cost)
+    return best
+
+
+def repeat(action, now):
+    return np.full(now.tripped.shape, action)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_dynamic_programming_finds_the_optimum_of_every_sequence(seed):
+    table = draw_table(seed, frames=6)
+    np.testing.assert_allclose(clairvoyant(table, levels=4001).cost, brute_force(table), atol=1e-9)
+
+
+def test_a_look_ahead_pays_where_heat_matters():
+    table = draw_table(1, drives=8, frames=60)
+    best, guarded = clairvoyant(table).cost, greedy(table, guarded=True).cost
+    assert (best <= guarded + 1e-9).all()
+    assert best.sum() < 0.98 * guarded.sum()
+
+
+def test_without_heat_the_optimum_is_greedy():
+    table = draw_table(2, frames=40, heat=(0.0, 0.0, 0.0))
+    best, short_sighted = clairvoyant(table), greedy(table, guarded=False)
+    np.testing.assert_array_equal(best.actions, short_sighted.actions)
+    np.testing.assert_allclose(best.cost, table.cost.min(axis=2).sum(axis=1))
+
+
+def test_the_guard_never_trips_where_it_need_not():
+    table = draw_table(3, frames=50)
+    assert greedy(table, guarded=False).tripped_share > 0.0
+    assert greedy(table, guarded=True).tripped_share == 0.0
+
+
+def test_a_tripped_laser_stays_off_until_it_has_cooled():
+    table = draw_table(4, drives=1, frames=12, heat=(0.0, 0.0, 25.0))
+    played = play(table, fixed(2))
+    off = played.actions[0] < 0
+    assert off.any() and not off.all()
+    expected = np.where(off, 3.0, table.cost[0, :, 2]).sum()
+    assert played.cost[0] == pytest.approx(expected)
+
+
+def test_blind_choices_do_what_their_names_say():
+    table = draw_table(5, frames=600, heat=(0.0, 0.0, 0.0))
+    shares = {name: play(table, choose).shares for name, choose in blind_choices()}
+    np.testing.assert_allclose(shares["always 4"], [0, 1, 0])
+    np.testing.assert_allclose(shares["8 every 3 frames, else 2"], [2 / 3, 0, 1 / 3])
+    np.testing.assert_allclose(shares["mixture 20%/20%/60% of 2/4/8"], [0.2, 0.2, 0.6], atol=0.03)
+
+
+def test_no_blind_choice_beats_the_optimum():
+    table = draw_table(6, frames=40)
+    best = clairvoyant(table).cost
+    for _, choose in blind_choices(longest=4):
+        assert (play(table, choose).cost >= best - 1e-9).all()
+
+
+def test_cycle_and_mixture_ignore_the_drive():
+    table = draw_table(7)
+    now = Situation(4, table.start_k, np.zeros(6, bool), table)
+    np.testing.assert_array_equal(cycle((2, 0, 0))(now), np.zeros(6))
+    np.testing.assert_array_equal(mixture((0.0, 1.0, 0.0))(now), np.ones(6))
