@@ -14,7 +14,6 @@ from shotenv.config import SensorConfig
 
 PLANCK_J_S = 6.62607015e-34
 SPEED_OF_LIGHT_M_S = 299_792_458.0
-TAP_SIGNS = (1.0, -1.0)
 
 
 def photon_energy_j(wavelength_nm: float) -> float:
@@ -34,24 +33,26 @@ def electrons_per_radiance_second(sensor: SensorConfig) -> float:
     return irradiance * area_m2 * per_photon
 
 
-def tap_electrons(total_e: Tensor, modulated_e: Tensor) -> Tensor:
-    """Mean charge of both taps, `(S + B) / 2 +- m C_k / 2`.
+def tap_electrons(mean_e: Tensor, half_modulated_e: Tensor) -> Tensor:
+    """Mean charge of both taps in one sample, `(S + B) / 2 +- m C_k / 2`.
 
     Parameters
     ----------
-    total_e : [B, H, W]
-        Electrons over both taps in one sample, S + B.
-    modulated_e : [B, n, H, W]
-        Demodulated electrons m C_k of each sample.
+    mean_e : [B, H, W]
+        Half of the electrons over both taps, (S + B) / 2.
+    half_modulated_e : [B, H, W]
+        Half of the demodulated electrons, m C_k / 2.
 
     Returns
     -------
-    [B, n, 2, H, W]
+    [B, 2, H, W]
         Electrons of tap A and tap B, not negative.
     """
-    half = 0.5 * modulated_e
-    mean = (0.5 * total_e).unsqueeze(1)
-    return torch.stack((mean + half, mean - half), dim=2).clamp_(min=0.0)
+    batch, height, width = mean_e.shape
+    taps = mean_e.new_empty(batch, 2, height, width)
+    torch.add(mean_e, half_modulated_e, out=taps[:, 0])
+    torch.sub(mean_e, half_modulated_e, out=taps[:, 1])
+    return taps.clamp_(min=0.0)
 
 
 def add_noise(charge_e: Tensor, normals: Tensor, read_noise_e: float) -> Tensor:
