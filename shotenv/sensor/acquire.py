@@ -52,45 +52,63 @@ def expose(
         The light is NaN, infinite or of the wrong shape; the message names the array.
     """
     shots = Shots(shots)
-    check_exposure(exposure, laser_power_w, integration_s, noise, shots)
+    check_exposure(exposure, shots)
+    check_settings(exposure, shots, laser_power_w, integration_s, noise)
+    return acquire(
+        exposure,
+        sensor,
+        shots=shots,
+        laser_power_w=laser_power_w,
+        integration_s=integration_s,
+        noise=noise,
+        offsets=offsets,
+    )
+
+
+def acquire(
+    exposure: Exposure,
+    sensor: SensorConfig,
+    *,
+    shots: Shots,
+    laser_power_w: Tensor,
+    integration_s: Tensor,
+    noise: Tensor | None,
+    offsets: OffsetPattern | None,
+) -> RawFrame:
+    """`expose` for arrays that are known to be sound."""
     active_e, ambient_e = collected_electrons(exposure, sensor, laser_power_w, integration_s)
-    mean_e = (active_e + ambient_e).mul_(0.5)
-    per_w = _electrons_per_radiance(sensor, integration_s) * laser_power_w[:, None, None]
-    half_scale = (0.5 * sensor.contrast * per_w).to(mean_e.dtype)
     pattern_lsb = fixed_pattern_lsb(ambient_e, sensor, offsets)
+    mean_e = active_e.add_(ambient_e).mul_(0.5)
+    half_scale = 0.5 * sensor.contrast * _per_watt(sensor, laser_power_w, integration_s, mean_e)
     dcs_lsb = torch.empty_like(exposure.correlation[:, :shots])
-    saturated = torch.zeros_like(mean_e, dtype=torch.bool)
-    # One sample at a time keeps the working set in cache: measured 3 x faster than all at once.
+    fullest_e = torch.zeros_like(mean_e)
+    # One sample at a time keeps the working set in the processor's cache.
     for k in range(shots):
         taps_e = tap_electrons(mean_e, exposure.correlation[:, k] * half_scale)
         if noise is not None:
             taps_e = add_noise(taps_e, noise[:, k], sensor.read_noise_e)
-        dcs_lsb[:, k], filled = read_out(taps_e, pattern_lsb, sensor)
-        saturated |= filled
-    return RawFrame(dcs_lsb, saturated)
+        torch.maximum(fullest_e, taps_e[:, 0], out=fullest_e)
+        torch.maximum(fullest_e, taps_e[:, 1], out=fullest_e)
+        dcs_lsb[:, k] = read_out(taps_e, pattern_lsb, sensor)
+    return RawFrame(dcs_lsb, _saturated(fullest_e, dcs_lsb, sensor))
 
 
-def read_out(
-    taps_e: Tensor, pattern_lsb: Tensor | float, sensor: SensorConfig
-) -> tuple[Tensor, Tensor]:
-    """Words of one sample from its taps [B, 2, H, W].
+def read_out(taps_e: Tensor, pattern_lsb: Tensor | float, sensor: SensorConfig) -> Tensor:
+    """Signed words [B, H, W] of one sample from its taps [B, 2, H, W], electrons.
 
     Each tap clips at its full well *before* the difference; then gain, offset, rounding and the
     converter's range.
-
-    Returns
-    -------
-    dcs_lsb : [B, H, W]
-        Signed words.
-    saturated : bool [B, H, W]
-        A tap was full or the word is at a limit of the range.
     """
-    low, high = signed_limits_lsb(sensor.adc_bits)
-    filled = torch.maximum(taps_e[:, 0], taps_e[:, 1]) >= sensor.full_well_e
     held_e = clip_to_full_well(taps_e, sensor.full_well_e)
     analogue_lsb = (held_e[:, 0] - held_e[:, 1]).mul_(sensor.gain_lsb_per_e).add_(pattern_lsb)
-    dcs_lsb = digitise(analogue_lsb, low, high)
-    return dcs_lsb, filled.logical_or_(dcs_lsb.abs() >= high)
+    return digitise(analogue_lsb, *signed_limits_lsb(sensor.adc_bits))
+
+
+def _saturated(fullest_e: Tensor, dcs_lsb: Tensor, sensor: SensorConfig) -> Tensor:
+    """Where the fullest tap was full, or a word is at a limit of the converter's range."""
+    low, high = signed_limits_lsb(sensor.adc_bits)
+    lowest, highest = torch.aminmax(dcs_lsb, dim=1)
+    return (fullest_e >= sensor.full_well_e) | (lowest <= low) | (highest >= high)
 
 
 def fixed_pattern_lsb(
@@ -106,9 +124,9 @@ def collected_electrons(
     exposure: Exposure, sensor: SensorConfig, laser_power_w: Tensor, integration_s: Tensor
 ) -> tuple[Tensor, Tensor]:
     """Active S and ambient B [B, H, W], electrons over both taps in one sample."""
-    rate = _electrons_per_radiance(sensor, integration_s).to(exposure.ambient.dtype)
-    power = laser_power_w[:, None, None].to(exposure.ambient.dtype)
-    return exposure.active * (rate * power), exposure.ambient * rate
+    like = exposure.ambient
+    active_e = exposure.active * _per_watt(sensor, laser_power_w, integration_s, like)
+    return active_e, like * _per_radiance(sensor, integration_s, like)
 
 
 def single_sample_snr(active_e: Tensor, ambient_e: Tensor, sensor: SensorConfig) -> Tensor:
@@ -117,23 +135,26 @@ def single_sample_snr(active_e: Tensor, ambient_e: Tensor, sensor: SensorConfig)
     return variance.rsqrt_().mul_(active_e).mul_(sensor.contrast)
 
 
-def _electrons_per_radiance(sensor: SensorConfig, integration_s: Tensor) -> Tensor:
-    return (electrons_per_radiance_second(sensor) * integration_s)[:, None, None]
+def _per_radiance(sensor: SensorConfig, integration_s: Tensor, like: Tensor) -> Tensor:
+    """Electrons [B, 1, 1] of one sample per W m-2 sr-1."""
+    rate = electrons_per_radiance_second(sensor)
+    return (rate * integration_s).to(like.dtype)[:, None, None]
 
 
-def check_exposure(
-    exposure: Exposure,
-    laser_power_w: Tensor,
-    integration_s: Tensor,
-    noise: Tensor | None,
-    shots: Shots,
-) -> None:
-    """Refuse light and settings that cannot be acquired.
+def _per_watt(
+    sensor: SensorConfig, laser_power_w: Tensor, integration_s: Tensor, like: Tensor
+) -> Tensor:
+    """Electrons [B, 1, 1] of one sample per W m-2 sr-1 and watt of laser power."""
+    return _per_radiance(sensor, integration_s * laser_power_w, like)
+
+
+def check_exposure(exposure: Exposure, shots: Shots) -> None:
+    """Refuse light that cannot be acquired.
 
     Raises
     ------
     ValueError
-        A shape that does not fit, a negative setting or a value that is not finite.
+        Too few samples, a shape that does not fit, NaN or infinity; the message names the array.
     """
     batch, samples, height, width = exposure.correlation.shape
     if samples < shots:
@@ -142,14 +163,34 @@ def check_exposure(
     for name, value in maps.items():
         if value.shape != (batch, height, width):
             raise ValueError(f"{name} is {tuple(value.shape)}; expected {(batch, height, width)}")
+        if not bool((value >= 0).all()):
+            raise ValueError(f"{name} holds NaN or a negative radiance; expected finite values")
+    for name, value in {"correlation": exposure.correlation[:, :shots], **maps}.items():
+        if not bool(torch.isfinite(value).all()):
+            raise ValueError(f"{name} holds NaN or infinity; expected finite radiance")
+
+
+def check_settings(
+    exposure: Exposure,
+    shots: Shots,
+    laser_power_w: Tensor,
+    integration_s: Tensor,
+    noise: Tensor | None,
+) -> None:
+    """Refuse laser power, integration time or noise that do not fit the light.
+
+    Raises
+    ------
+    ValueError
+        A shape that does not fit, a negative or not finite setting; the message names it.
+    """
+    batch, _, height, width = exposure.correlation.shape
     for name, value in {"laser_power_w": laser_power_w, "integration_s": integration_s}.items():
         if value.shape != (batch,) or not bool(((value >= 0) & torch.isfinite(value)).all()):
             raise ValueError(f"{name} is {value.tolist()}; expected {batch} finite values >= 0")
-    if noise is not None and (noise.ndim != 5 or noise.shape[1] < shots):
-        raise ValueError(
-            f"noise is {tuple(noise.shape)}; expected {(batch, int(shots), 2, height, width)}"
-        )
-    for name, value in {"correlation": exposure.correlation[:, :shots], **maps}.items():
-        # A sum is NaN or infinite as soon as one term is: one pass instead of three.
-        if not bool(torch.isfinite(value.sum())):
-            raise ValueError(f"{name} holds NaN or infinity; expected finite radiance")
+    if noise is None:
+        return
+    expected = (batch, int(shots), 2, height, width)
+    fits = noise.ndim == 5 and noise[:, :shots].shape == expected
+    if not fits or not bool(torch.isfinite(noise).all()):
+        raise ValueError(f"noise is {tuple(noise.shape)}; expected finite normals {expected}")

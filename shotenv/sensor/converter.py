@@ -21,5 +21,5 @@ def full_scale_lsb(bits: int) -> int:
 
 
 def digitise(analogue_lsb: Tensor, low_lsb: float, high_lsb: float) -> Tensor:
-    """Whole words: rounded half to even, clipped to the range; the dtype stays."""
-    return analogue_lsb.round().clamp_(low_lsb, high_lsb)
+    """Whole words in place: rounded half to even, clipped to the range; the dtype stays."""
+    return analogue_lsb.round_().clamp_(low_lsb, high_lsb)

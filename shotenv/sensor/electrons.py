@@ -66,5 +66,5 @@ def add_noise(charge_e: Tensor, normals: Tensor, read_noise_e: float) -> Tensor:
 
 
 def clip_to_full_well(charge_e: Tensor, full_well_e: float) -> Tensor:
-    """Charge limited to what a tap can hold and read, 0..full well, electrons."""
-    return charge_e.clamp(0.0, full_well_e)
+    """Charge limited in place to what a tap can hold and read, 0..full well, electrons."""
+    return charge_e.clamp_(0.0, full_well_e)
