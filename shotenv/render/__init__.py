@@ -1,1 +1,19 @@
-"""A world becomes light, with Mitsuba. The only room that imports mitsuba or drjit."""
+"""Worlds to noise-free light: the only room that imports Mitsuba, and not before it must.
+
+`render_frame` gives what the sensor needs of one frame; `shotenv.render.integrator.trace` is the
+integrator underneath it; `run_jobs` renders in worker processes.
+"""
+
+from shotenv.render.frame import RenderedFrame, render_frame
+from shotenv.render.instants import Instants, frame_instants
+from shotenv.render.llvm import RendererError, find_llvm, require_llvm
+
+__all__ = [
+    "Instants",
+    "RenderedFrame",
+    "RendererError",
+    "find_llvm",
+    "frame_instants",
+    "render_frame",
+    "require_llvm",
+]

@@ -1,0 +1,68 @@
+"""One frame of the sensor, noise-free: eight samples and the gray image at their own instants."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shotenv.config import CameraConfig, SensorConfig
+from shotenv.render.instants import frame_instants
+from shotenv.render.llvm import start_mitsuba
+from shotenv.world.model import World
+from unwrap.acquisition import Shots, demodulation_phase_rad, frequency_index
+
+
+@dataclass(frozen=True)
+class RenderedFrame:
+    """Noise-free light of one frame; the arrays of `shotenv.frames.Exposure` without a batch.
+
+    Attributes
+    ----------
+    correlation : float32 [8, H, W]
+        Re(P_f exp(-i theta_k)) of each sample at its own instant, W m-2 sr-1 per watt of laser.
+    active : float32 [H, W]
+        Active radiance, mean over the samples, W m-2 sr-1 per watt of laser.
+    ambient : float32 [H, W]
+        Ambient radiance in band, mean over the gray exposure, W m-2 sr-1.
+    distance_m : float32 [H, W]
+        Distance through the pixel's centre at the start of the frame, metres; infinite for sky.
+    """
+
+    correlation: np.ndarray
+    active: np.ndarray
+    ambient: np.ndarray
+    distance_m: np.ndarray
+
+
+def render_frame(
+    world: World, time_s: float, camera: CameraConfig, sensor: SensorConfig, *, seed: int
+) -> RenderedFrame:
+    """Render the frame of `world` whose first sample starts at `time_s`.
+
+    Raises
+    ------
+    RendererError
+        Mitsuba or a usable LLVM library is missing.
+    """
+    start_mitsuba()
+    from shotenv.render.integrator import trace
+
+    instants = frame_instants(time_s, camera, sensor)
+    traced = trace(world, instants, camera, (sensor.f1_hz, sensor.f2_hz), seed=seed)
+    laser, passive = np.array(instants.laser), np.array(instants.passive)
+    return RenderedFrame(
+        correlation=correlate(traced.phasor[:, laser]),
+        active=traced.active[laser].mean(axis=0),
+        ambient=traced.ambient[passive].mean(axis=0),
+        distance_m=traced.distance_m[0],
+    )
+
+
+def correlate(phasor: np.ndarray) -> np.ndarray:
+    """Correlation [8, H, W] of the phasors [2, 8, H, W]: each sample's own frequency and phase."""
+    samples = range(int(Shots.EIGHT))
+    turned = [
+        phasor[frequency_index(k), k] * np.exp(-1j * demodulation_phase_rad(k)) for k in samples
+    ]
+    return np.real(np.stack(turned)).astype(np.float32)

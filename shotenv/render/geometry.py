@@ -1,0 +1,122 @@
+"""The triangles of a world at a set of instants, as plain arrays.
+
+What stands still is one mesh in world coordinates. What moves is posed once per instant, and the
+copies stand on a grid so wide that no ray of one instant can reach the copy of another: one
+launch renders all instants, and shape counts never change.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shotenv.world.model import Mesh, Pose, World
+
+REACH_M = 150.0
+"""Length of the longest ray; what lies beyond counts as sky."""
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Triangles and what is known of each. S static faces, M moving faces, T instants.
+
+    Attributes
+    ----------
+    static : float32 [S, 3, 3]
+        Corners of what stands still, world coordinates, metres.
+    moving : float32 [T * M, 3, 3]
+        Corners of what moves at each instant, world coordinates plus `tile_m` of the instant.
+    tile_m : float32 [T, 3]
+        Where on the grid the copy of each instant stands.
+    normals : float32 [S + T * M, 4]
+        Unit face normals and a zero.
+    surface : float32 [S + M, 4]
+        Albedo where the noise texture is 0 and where it is 1, retro-reflection, emission.
+    uv : float32 [S + M, 8]
+        Texture coordinates of the first corner, then the edges to the other two, then zeros.
+    """
+
+    static: np.ndarray
+    moving: np.ndarray
+    tile_m: np.ndarray
+    normals: np.ndarray
+    surface: np.ndarray
+    uv: np.ndarray
+
+
+def rotation(pose: Pose) -> np.ndarray:
+    """Matrix [3, 3] from a pose's own axes to the world: pitch about y first, then yaw about z.
+
+    Both turn by the right-hand rule, so that a positive pitch looks down.
+    """
+    cy, sy = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    cp, sp = math.cos(pose.pitch_rad), math.sin(pose.pitch_rad)
+    return np.array([[cy * cp, -sy, cy * sp], [sy * cp, cy, sy * sp], [-sp, 0.0, cp]])
+
+
+def geometry_at(world: World, times_s: Sequence[float], bounces: int) -> Geometry:
+    """Triangles of `world` at `times_s` for light paths of at most `bounces` surface hits."""
+    moving = np.stack([_posed(world, t) for t in times_s])
+    radius = np.abs(moving[..., :2] - np.asarray(world.ego.at(times_s[0]).position_m[:2])).max()
+    tile = tile_grid(len(times_s), spacing_m=radius + (bounces + 1) * REACH_M)
+    meshes = [world.static, *(thing.mesh for thing in world.moving), *_padding(world)]
+    tiled = (moving + tile[:, None, None, :]).reshape(-1, 3, 3)
+    return Geometry(
+        static=world.static.corners.astype(np.float32),
+        moving=tiled.astype(np.float32),
+        tile_m=tile.astype(np.float32),
+        normals=_normals(np.concatenate([world.static.corners, moving.reshape(-1, 3, 3)])),
+        surface=np.concatenate([_surface(mesh) for mesh in meshes]),
+        uv=np.concatenate([_edges_uv(mesh) for mesh in meshes]),
+    )
+
+
+def tile_grid(count: int, spacing_m: float) -> np.ndarray:
+    """Offsets [count, 3] on a square grid about the origin, metres."""
+    side = math.ceil(math.sqrt(count))
+    row, column = np.divmod(np.arange(count), side)
+    offsets = np.stack([column, row, np.zeros(count)], axis=1).astype(float)
+    offsets[:, :2] -= offsets[:, :2].mean(axis=0)
+    return np.round(offsets * spacing_m)
+
+
+def _posed(world: World, time_s: float) -> np.ndarray:
+    """Corners [M, 3, 3] of everything that moves, float64, at `time_s`; M is at least one."""
+    parts = [_place(thing.mesh.corners, thing.motion.at(time_s)) for thing in world.moving]
+    parts += [mesh.corners.astype(float) for mesh in _padding(world)]
+    return np.concatenate(parts)
+
+
+def _place(corners: np.ndarray, pose: Pose) -> np.ndarray:
+    return corners.astype(float) @ rotation(pose).T + np.asarray(pose.position_m)
+
+
+def _padding(world: World) -> list[Mesh]:
+    """A triangle without area for worlds in which nothing moves: a mesh cannot be empty."""
+    if any(len(thing.mesh.corners) for thing in world.moving):
+        return []
+    zero = np.zeros(1, np.float32)
+    buried = np.float32(world.ego.start.position_m) - np.float32((0, 0, 10))
+    corners = np.broadcast_to(buried, (1, 3, 3))
+    return [Mesh(corners, np.zeros((1, 3, 2), np.float32), zero, zero, zero, zero)]
+
+
+def _normals(corners: np.ndarray) -> np.ndarray:
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    unit = normal / np.where(length > 0, length, 1.0)
+    return np.pad(unit, ((0, 0), (0, 1))).astype(np.float32)
+
+
+def _surface(mesh: Mesh) -> np.ndarray:
+    columns = (mesh.albedo_low, mesh.albedo_high, mesh.retro, mesh.emission)
+    return np.stack(columns, axis=1).astype(np.float32)
+
+
+def _edges_uv(mesh: Mesh) -> np.ndarray:
+    first, second, third = np.moveaxis(mesh.uv.astype(np.float32), 1, 0)
+    packed = np.concatenate([first, second - first, third - first], axis=1)
+    return np.pad(packed, ((0, 0), (0, 2)))

@@ -1,0 +1,50 @@
+"""When light is gathered for a frame: the instants that one launch of the integrator renders."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from shotenv.config import CameraConfig, SensorConfig
+from unwrap.acquisition import Shots, sample_times_s
+
+
+@dataclass(frozen=True)
+class Instants:
+    """T instants, each with its own camera pose and its own poses of what moves.
+
+    Attributes
+    ----------
+    times_s : tuple of float, T
+        Times in the clip, seconds.
+    laser, passive : tuple of bool, T
+        Whether the laser, and whether sun, sky and lamps are rendered at the instant.
+    draw : tuple of int, T
+        Instants with the same number share their random numbers, so that they differ by what
+        moved and not by Monte Carlo noise.
+    """
+
+    times_s: tuple[float, ...]
+    laser: tuple[bool, ...]
+    passive: tuple[bool, ...]
+    draw: tuple[int, ...]
+
+    def __len__(self) -> int:
+        return len(self.times_s)
+
+
+def frame_instants(time_s: float, camera: CameraConfig, sensor: SensorConfig) -> Instants:
+    """Instants of a frame that starts at `time_s`: eight samples, then the gray exposure.
+
+    The samples start at the times of `unwrap.acquisition`; the gray instants are the midpoints of
+    equal parts of the longest gray exposure, which ends where the first sample starts.
+    """
+    samples = [time_s + t for t in sample_times_s(Shots.EIGHT, sensor.sample_period_s)]
+    gray_count = camera.gray_instants
+    gray = [time_s - sensor.gray_max_exposure_s * (i + 0.5) / gray_count for i in range(gray_count)]
+    laser = (True,) * len(samples) + (False,) * gray_count
+    return Instants(
+        times_s=(*samples, *gray),
+        laser=laser,
+        passive=tuple(not on for on in laser),
+        draw=(0,) * len(samples) + tuple(range(1, gray_count + 1)),
+    )

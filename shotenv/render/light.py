@@ -1,0 +1,137 @@
+"""Sun, sky and lamps at a surface: one shadow ray, spent where the light would be strongest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from shotenv.render.geometry import REACH_M, rotation
+from shotenv.render.instants import Instants
+from shotenv.render.scene import Hit, Scene
+from shotenv.world.model import MAX_LAMPS, Lamp, Pose, World
+
+_LAMP_NUMBERS = 12
+
+
+@dataclass(frozen=True)
+class _Choice:
+    """One light kept out of those offered so far, and the sum of what all would give."""
+
+    total: Any
+    direction: Any
+    length: Any
+    number: Any
+
+    def offer(self, irradiance, direction, length) -> _Choice:
+        """Keep the new light with probability `irradiance` over the new total.
+
+        The random number is stretched back to [0, 1) for the next offer.
+        """
+        total = self.total + irradiance
+        share = dr.select(total > 0, irradiance / total, 0)
+        taken = self.number < share
+        rest = (self.number - share) / (1 - share)
+        return _Choice(
+            total,
+            dr.select(taken, direction, self.direction),
+            dr.select(taken, length, self.length),
+            dr.select(taken, self.number / share, rest),
+        )
+
+
+class PassiveLight:
+    """Sun, sky and lamps of a world at each instant, on the device."""
+
+    def __init__(self, world: World, instants: Instants):
+        light = world.light
+        poses = [world.ego.at(t) for t in instants.times_s]
+        table = np.stack([lamp_table(light.lamps, pose) for pose in poses])
+        self._lamps = mi.Float(table.ravel())
+        self._lamp_count = dr.opaque(mi.UInt32, len(light.lamps))
+        self._sun_irradiance = dr.opaque(mi.Float, light.sun_irradiance)
+        self._sun_direction = mi.Vector3f(
+            [dr.opaque(mi.Float, number) for number in light.sun_direction]
+        )
+        self._horizon = dr.opaque(mi.Float, light.sky_horizon)
+        self._zenith = dr.opaque(mi.Float, light.sky_zenith)
+
+    def sky(self, direction):
+        """Radiance of the sky, W m-2 sr-1: linear in the sine of elevation, the horizon's below."""
+        return dr.fma(self._zenith - self._horizon, dr.maximum(direction.z, 0), self._horizon)
+
+    def reflected(self, scene: Scene, hit: Hit, instant, sampler, active):
+        """Radiance that a surface reflects of the light reaching it directly, W m-2 sr-1.
+
+        The irradiance of every light is computed unshadowed (the sky's from one cosine-sampled
+        direction); one light is drawn in proportion, and only that one is tested for shadow:
+        the estimate is the sum of all irradiances where it is seen, 0 where it is not.
+        """
+        choice = self._choose(hit, instant, sampler, active)
+        lit = active & (choice.total > 0)
+        seen = scene.visible(hit.leave, choice.direction, choice.length, instant, lit)
+        return dr.select(seen, hit.albedo * dr.inv_pi * choice.total, 0)
+
+    def _choose(self, hit: Hit, instant, sampler, active) -> _Choice:
+        sky_direction = mi.Frame3f(hit.normal).to_world(
+            mi.warp.square_to_cosine_hemisphere(sampler.next_2d())
+        )
+        far = mi.Float(REACH_M)
+        choice = _Choice(dr.pi * self.sky(sky_direction), sky_direction, far, sampler.next_1d())
+        cos_sun = dr.maximum(dr.dot(hit.normal, self._sun_direction), 0)
+        choice = choice.offer(self._sun_irradiance * cos_sun, self._sun_direction, far)
+        return self._offer_lamps(choice, hit, instant, active)
+
+    def _offer_lamps(self, choice: _Choice, hit: Hit, instant, active) -> _Choice:
+        def more(index, *_):
+            return active & (index < self._lamp_count)
+
+        def offer(index, *state):
+            lamp = self._lamp(instant * MAX_LAMPS + index, hit, active)
+            kept = _Choice(*state).offer(*lamp)
+            return (index + 1, kept.total, kept.direction, kept.length, kept.number)
+
+        start = (mi.UInt32(0), choice.total, choice.direction, choice.length, choice.number)
+        _, *state = dr.while_loop(start, more, offer, label="lamps")
+        return _Choice(*state)
+
+    def _lamp(self, row, hit: Hit, active):
+        """Irradiance, direction and length of the shadow ray of one lamp at a surface."""
+        rows = [dr.gather(mi.Vector4f, self._lamps, 3 * row + i, active) for i in range(3)]
+        position, axis, cutoff_cos = rows[0].xyz, rows[1].xyz, rows[1].w
+        intensity, radius = rows[0].w, rows[2].x
+        away = position - hit.point
+        square = dr.squared_norm(away)
+        distance = dr.sqrt(square)
+        direction = away / dr.maximum(distance, 1e-6)
+        cos_surface = dr.maximum(dr.dot(hit.normal, direction), 0)
+        falloff = spot_falloff(-dr.dot(axis, direction), cutoff_cos)
+        irradiance = intensity * falloff * cos_surface / (square + dr.square(radius))
+        # The lamp's own housing is within its radius and throws no shadow.
+        return irradiance, direction, dr.maximum(distance - radius, 0)
+
+
+def spot_falloff(cos_axis, cutoff_cos):
+    """Intensity towards an angle from the axis: a smooth step from 0 at the cutoff to 1 ahead."""
+    t = dr.clip((cos_axis - cutoff_cos) / (1 - cutoff_cos), 0, 1)
+    return dr.select(cutoff_cos <= -1, 1, t * t * (3 - 2 * t))
+
+
+def lamp_table(lamps: tuple[Lamp, ...], camera: Pose) -> np.ndarray:
+    """Rows [MAX_LAMPS, 12]: position, intensity, axis, cutoff cosine, radius, zeros.
+
+    Lamps that ride are given in the camera's axes and are put where the camera is.
+    """
+    table = np.zeros((MAX_LAMPS, _LAMP_NUMBERS), np.float32)
+    turn, origin = rotation(camera), np.asarray(camera.position_m)
+    for row, lamp in zip(table, lamps, strict=False):
+        position, axis = np.asarray(lamp.position_m), np.asarray(lamp.direction)
+        if lamp.rides:
+            position, axis = turn @ position + origin, turn @ axis
+        row[:3], row[3] = position, lamp.intensity_w_sr
+        row[4:7], row[7] = axis / np.linalg.norm(axis), lamp.cutoff_cos
+        row[8] = lamp.radius_m
+    return table

@@ -1,0 +1,75 @@
+"""The camera and the laser beside it: a pinhole at the centre of projection."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from shotenv.config import CameraConfig
+from shotenv.render.geometry import rotation
+from shotenv.render.instants import Instants
+from shotenv.world.model import Motion
+
+
+def half_extents(camera: CameraConfig) -> tuple[float, float]:
+    """Tangents of half the horizontal and half the vertical field of view; square pixels."""
+    across = math.tan(math.radians(camera.horizontal_fov_deg) / 2)
+    return across, across * camera.height / camera.width
+
+
+def field_of_view_sr(camera: CameraConfig) -> float:
+    """Solid angle of the field of view, a rectangular pyramid: 4 asin(sin a sin b), sr."""
+    across, down = half_extents(camera)
+    return 4 * math.asin(across / math.hypot(1, across) * down / math.hypot(1, down))
+
+
+class Pinhole:
+    """Camera poses of all instants on the device, with the laser at the same place.
+
+    Rays start at the centre of projection itself, so that distances are true distances.
+    """
+
+    def __init__(self, ego: Motion, instants: Instants, camera: CameraConfig):
+        poses = [ego.at(t) for t in instants.times_s]
+        self._camera = camera
+        self._position = mi.Float(np.float32([pose.position_m for pose in poses]).ravel())
+        axes = np.stack([rotation(pose).T for pose in poses])
+        self._axes = mi.Float(axes.astype(np.float32).ravel())
+
+    def rays(self, lanes, jitter) -> tuple[Any, Any]:
+        """Origin and direction of each lane's ray; sample 0 goes through the pixel's centre."""
+        camera = self._camera
+        across, down = half_extents(camera)
+        offset = dr.select(lanes.sample == 0, 0.5, jitter)
+        column = mi.Float(lanes.pixel % camera.width) + offset.x
+        row = mi.Float(lanes.pixel // camera.width) + offset.y
+        left = across * (1 - column * (2 / camera.width))
+        up = down * (1 - row * (2 / camera.height))
+        ahead, leftward, upward = self._axes_at(lanes.instant)
+        direction = dr.normalize(ahead + left * leftward + up * upward)
+        return self._position_at(lanes.instant), direction
+
+    def laser(self, point, instant) -> tuple[Any, Any, Any]:
+        """Radiant intensity (W sr-1 per watt) towards `point`, direction from it, distance."""
+        away = self._position_at(instant) - point
+        distance = dr.norm(away)
+        direction = away / distance
+        ahead, leftward, upward = self._axes_at(instant)
+        across, down = half_extents(self._camera)
+        depth = -dr.dot(direction, ahead)
+        # A lane's own ray may leave the outermost pixel's edge by a rounding error.
+        limit = depth * (1 + 1e-5)
+        inside = (dr.abs(dr.dot(direction, leftward)) <= across * limit) & (
+            dr.abs(dr.dot(direction, upward)) <= down * limit
+        )
+        return dr.select(inside, 1 / field_of_view_sr(self._camera), 0), direction, distance
+
+    def _position_at(self, instant):
+        return dr.gather(mi.Point3f, self._position, instant)
+
+    def _axes_at(self, instant):
+        return [dr.gather(mi.Vector3f, self._axes, 3 * instant + i) for i in range(3)]
