@@ -107,7 +107,7 @@ def read_out(taps_e: Tensor, pattern_lsb: Tensor | float, sensor: SensorConfig) 
 def _saturated(fullest_e: Tensor, dcs_lsb: Tensor, sensor: SensorConfig) -> Tensor:
     """Where the fullest tap was full, or a word is at a limit of the converter's range."""
     low, high = signed_limits_lsb(sensor.adc_bits)
-    lowest, highest = torch.aminmax(dcs_lsb, dim=1)
+    lowest, highest = dcs_lsb.amin(dim=1), dcs_lsb.amax(dim=1)
     return (fullest_e >= sensor.full_well_e) | (lowest <= low) | (highest >= high)
 
 
