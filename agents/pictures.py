@@ -1,0 +1,70 @@
+"""Arrays to pictures that a page can hold: colour maps, PNG data URIs, colour bars."""
+
+from __future__ import annotations
+
+import base64
+import io
+from dataclasses import dataclass
+
+import numpy as np
+from PIL import Image
+
+LEVELS = 255  # one of the 256 palette entries is left for "no value"
+NO_VALUE_RGB = (214, 217, 222)
+
+
+@dataclass(frozen=True)
+class ColorMap:
+    """How a quantity is coloured: from `low` to `high` in `unit`, through `anchors` (#rrggbb)."""
+
+    low: float
+    high: float
+    unit: str
+    anchors: tuple[str, ...]
+
+    @property
+    def palette(self) -> np.ndarray:
+        """uint8 [256, 3]; the last entry stands for no value."""
+        stops = np.linspace(0.0, 1.0, len(self.anchors))
+        channels = np.array([_rgb(anchor) for anchor in self.anchors]).T
+        position = np.linspace(0.0, 1.0, LEVELS)
+        colors = np.stack([np.interp(position, stops, channel) for channel in channels], axis=-1)
+        return np.vstack([colors.round(), [NO_VALUE_RGB]]).astype(np.uint8)
+
+    @property
+    def css(self) -> str:
+        """The colour bar as a CSS gradient."""
+        return f"linear-gradient(to right, {', '.join(self.anchors)})"
+
+    @property
+    def ticks(self) -> tuple[str, str, str]:
+        """Low, middle and high as text."""
+        low, middle, high = (
+            f"{value:.3g}" for value in np.linspace(self.low, self.high, 3).tolist()
+        )
+        return low, middle, high
+
+
+VIRIDIS = (
+    *("#440154", "#482878", "#3e4989", "#31688e", "#26828e"),
+    *("#1f9e89", "#35b779", "#6ece58", "#b5de2b", "#fde725"),
+)
+CYCLIC = ("#2b1c4f", "#3f5fb0", "#86b9cf", "#f0ece4", "#d99a6c", "#99334d", "#2b1c4f")
+ERROR = ("#0b0b2a", "#4b1d6f", "#a02f6b", "#e4593f", "#fca50a", "#fcffa4")
+GRAY = ("#000000", "#ffffff")
+
+
+def picture(values: np.ndarray, colors: ColorMap) -> str:
+    """PNG data URI of `values` [H, W]; what is not finite is drawn in the no-value gray."""
+    scaled = (values - colors.low) / (colors.high - colors.low) * (LEVELS - 1)
+    known = np.isfinite(scaled)
+    index = np.where(known, np.clip(np.where(known, scaled, 0.0), 0, LEVELS - 1).round(), LEVELS)
+    image = Image.frombytes("P", values.shape[::-1], index.astype(np.uint8).tobytes())
+    image.putpalette(colors.palette.tobytes())
+    content = io.BytesIO()
+    image.save(content, format="PNG", optimize=True)
+    return "data:image/png;base64," + base64.b64encode(content.getvalue()).decode("ascii")
+
+
+def _rgb(color: str) -> tuple[int, int, int]:
+    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
