@@ -1,0 +1,205 @@
+"""What stands along a road, on z = 0 and facing +x: posts, signs, trees, barriers, boxes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shotenv.world import materials as m
+from shotenv.world import meshes
+from shotenv.world.model import Mesh
+
+LAMP_HEAD_M = (0.5, 0.22)
+
+
+def pole(rng: np.random.Generator) -> Mesh:
+    """A plain mast of wood, metal or concrete."""
+    finish = (m.METAL, m.WOOD, m.CONCRETE)[rng.integers(3)]
+    radius = rng.uniform(0.04, 0.16)
+    return meshes.rod((0, 0, 0), (0, 0, rng.uniform(3.0, 7.0)), radius, finish.draw(rng))
+
+
+def lamp_post(rng: np.random.Generator, height_m: float, radiance: float = 0.0) -> Mesh:
+    """A street lamp whose arm reaches 1.5 m along +x; its head glows with `radiance`."""
+    metal = m.METAL.draw(rng)
+    length, width = LAMP_HEAD_M
+    lens = m.LENS.draw(rng).glowing(radiance)
+    ring = [
+        (1.25, -width / 2),
+        (1.25, width / 2),
+        (1.25 + length, width / 2),
+        (1.25 + length, -width / 2),
+    ]
+    return meshes.join(
+        [
+            meshes.rod((0, 0, 0), (0, 0, height_m), 0.08, metal),
+            meshes.rod((0, 0, height_m - 0.1), (1.4, 0, height_m + 0.05), 0.04, metal, sections=6),
+            meshes.box((length + 0.04, width + 0.04, 0.1), metal, (1.5, 0, height_m)),
+            meshes.polygon([(x, y, height_m - 0.01) for x, y in ring], lens),
+        ]
+    )
+
+
+def sign(rng: np.random.Generator) -> Mesh:
+    """A traffic sign on a post: round, triangular, diamond or rectangular, retro-reflecting."""
+    metal, sheet, paint = m.METAL.draw(rng), m.RETRO_SHEET.draw(rng), m.DARK_METAL.draw(rng)
+    size, z = rng.uniform(0.3, 0.42), rng.uniform(1.9, 2.4)
+    sides, turn = ((10, 0.0), (3, np.pi / 2), (4, 0.0), (4, np.pi / 4))[rng.integers(4)]
+    outline = regular_polygon(sides, size, turn)
+    plates = [(1.0, 0.050, sheet), (0.55, 0.056, paint), (0.30, 0.062, sheet)]
+    faces = [
+        meshes.polygon([(x, share * y, z + share * h) for y, h in outline], material)
+        for share, x, material in plates
+    ]
+    rear = meshes.polygon([(0.045, y, z + h) for y, h in outline[::-1]], metal)
+    return meshes.join([meshes.rod((0, 0, 0), (0, 0, z + size), 0.035, metal), rear, *faces])
+
+
+def regular_polygon(sides: int, radius: float, turn: float) -> list[tuple[float, float]]:
+    """Corners of a regular polygon, counter-clockwise, the first at angle `turn`."""
+    angles = turn + np.linspace(0, 2 * np.pi, sides, endpoint=False)
+    return [(float(radius * np.cos(a)), float(radius * np.sin(a))) for a in angles]
+
+
+def tree(rng: np.random.Generator) -> Mesh:
+    """A broad-leaved tree: trunk and a crown of lumps, or a conifer."""
+    return conifer(rng) if rng.random() < 0.25 else broadleaf(rng)
+
+
+def broadleaf(rng: np.random.Generator) -> Mesh:
+    """Trunk with two branches under a crown of irregular lumps."""
+    bark, leaves = m.BARK.draw(rng), m.FOLIAGE.draw(rng)
+    stem, radius, spread = rng.uniform(1.5, 2.8), rng.uniform(0.1, 0.28), rng.uniform(0.8, 1.6)
+    trunk = meshes.lathe([(1.4 * radius, 0.0), (radius, 0.3), (0.7 * radius, stem + 0.6)], bark)
+    branches = [
+        meshes.rod((0, 0, stem - 0.3), (spread * np.cos(a) / 2, spread * np.sin(a) / 2, stem + 0.7),
+                   0.4 * radius, bark, sections=5)
+        for a in rng.uniform(0, 2 * np.pi, 2)
+    ]  # fmt: skip
+    lumps = [
+        meshes.blob(rng, rng.uniform(0.6, 1.0) * spread, leaves, (x, y, stem + spread * (0.6 + h)))
+        for x, y, h in zip(
+            *rng.uniform(-0.7, 0.7, (2, 4)) * spread, rng.uniform(0, 1.1, 4), strict=True
+        )
+    ]
+    return meshes.join([trunk, *branches, *lumps])
+
+
+def conifer(rng: np.random.Generator) -> Mesh:
+    """A stem under stacked cones."""
+    bark, needles = m.BARK.draw(rng), m.FOLIAGE.draw(rng)
+    height, width = rng.uniform(3.5, 7.0), rng.uniform(0.9, 1.6)
+    levels = np.linspace(0.15, 0.7, 4)
+    cones = [
+        meshes.lathe(
+            [(0, z * height), (width * (1 - z), z * height), (0, (z + 0.3) * height)], needles
+        )
+        for z in levels
+    ]
+    return meshes.join([meshes.rod((0, 0, 0), (0, 0, 0.5 * height), 0.12, bark), *cones])
+
+
+def bush(rng: np.random.Generator) -> Mesh:
+    """A few leafy lumps that reach the ground."""
+    leaves = m.FOLIAGE.draw(rng)
+    radius = rng.uniform(0.3, 0.6)
+    centres = rng.uniform(-1, 1, (3, 2)) * radius
+    return meshes.join(
+        meshes.blob(rng, radius * rng.uniform(0.7, 1.1), leaves, (x, y, 0.6 * radius))
+        for x, y in centres
+    )
+
+
+def hedge(rng: np.random.Generator, length_m: float) -> Mesh:
+    """A clipped hedge along y: overlapping lumps around a box."""
+    leaves, height = m.FOLIAGE.draw(rng), rng.uniform(0.8, 1.6)
+    lumps = [
+        meshes.blob(rng, 0.45, leaves, (0.1, y, height * h), detail=1)
+        for y, h in zip(
+            np.arange(-length_m / 2, length_m / 2, 0.8), rng.uniform(0.3, 0.8, 99), strict=False
+        )
+    ]
+    return meshes.join([meshes.box((0.7, length_m, height), leaves), *lumps])
+
+
+def bollard(rng: np.random.Generator) -> Mesh:
+    """A short post with a retro-reflecting ring."""
+    height, radius = rng.uniform(0.7, 1.05), rng.uniform(0.05, 0.11)
+    finish = (m.METAL, m.DARK_METAL, m.CONCRETE, m.WHITE_PAINT)[rng.integers(4)]
+    ring = [(1.05 * radius, 0.75 * height), (1.05 * radius, 0.85 * height)]
+    return meshes.join(
+        [
+            meshes.lathe(
+                [(radius, 0.0), (radius, height), (0.0, height + 0.03)],
+                finish.draw(rng),
+                sections=10,
+            ),
+            meshes.lathe(ring, m.RETRO_SHEET.draw(rng), sections=10),
+        ]
+    )
+
+
+def cone(rng: np.random.Generator) -> Mesh:
+    """A traffic cone."""
+    rubber, sheet = m.CLOTHES.draw(rng), m.RETRO_SHEET.draw(rng)
+    return meshes.join(
+        [
+            meshes.box((0.36, 0.36, 0.03), m.RUBBER.draw(rng)),
+            meshes.lathe([(0.14, 0.03), (0.03, 0.7), (0.0, 0.7)], rubber, sections=10),
+            meshes.lathe([(0.105, 0.3), (0.072, 0.46)], sheet, sections=10),
+        ]
+    )
+
+
+def crate(rng: np.random.Generator) -> Mesh:
+    """A box or a small stack of boxes."""
+    finishes = (m.CARDBOARD, m.WOOD, m.METAL, m.DARK_METAL)
+    size = rng.uniform(0.35, 0.9, 3)
+    lower = meshes.box(tuple(size), finishes[rng.integers(4)].draw(rng))
+    upper = meshes.box(tuple(0.7 * size), finishes[rng.integers(4)].draw(rng), (0.03, 0.0, size[2]))
+    return meshes.join([lower, upper]) if rng.random() < 0.4 else lower
+
+
+def bin_(rng: np.random.Generator) -> Mesh:
+    """A wheeled rubbish bin with its lid."""
+    body, lid = m.DARK_CLOTHES.draw(rng), m.DARK_METAL.draw(rng)
+    slope = [(-0.25, 0.0), (0.2, 0.0), (0.32, 0.95), (-0.28, 0.95)]
+    cover = meshes.box((0.66, 0.62, 0.06), lid, (0.02, 0.0, 0.951))
+    return meshes.join([meshes.extrude(slope, 0.55, body), cover])
+
+
+def guard_rail(rng: np.random.Generator, length_m: float) -> Mesh:
+    """A steel beam on posts, along y."""
+    metal = m.METAL.draw(rng)
+    posts = [
+        meshes.box((0.08, 0.12, 0.7), metal, (-0.06, y, 0.0))
+        for y in np.arange(-length_m / 2 + 0.5, length_m / 2, 4.0)
+    ]
+    beams = [meshes.box((0.05, length_m, 0.12), metal, (0.02, 0.0, z)) for z in (0.45, 0.61)]
+    return meshes.join(
+        [*posts, *beams, meshes.box((0.03, length_m, 0.05), metal, (0.0, 0.0, 0.565))]
+    )
+
+
+def jersey_barrier(rng: np.random.Generator, length_m: float) -> Mesh:
+    """A concrete barrier with the usual sloped foot, along y."""
+    concrete = m.CONCRETE.draw(rng)
+    foot = meshes.extrude(
+        [(-0.3, 0.0), (0.3, 0.0), (0.12, 0.33), (-0.12, 0.33)], length_m, concrete
+    )
+    stem = meshes.extrude(
+        [(-0.12, 0.33), (0.12, 0.33), (0.07, 0.85), (-0.07, 0.85)], length_m, concrete
+    )
+    return meshes.join([foot, stem])
+
+
+def fence(rng: np.random.Generator, length_m: float) -> Mesh:
+    """Upright boards with gaps on two rails, along y."""
+    wood, height = m.WOOD.draw(rng), rng.uniform(0.9, 1.5)
+    boards = [
+        meshes.box((0.03, 0.14, height), wood, (0.0, y, 0.0))
+        for y in np.arange(-length_m / 2 + 0.1, length_m / 2, 0.35)
+    ]
+    rails = [
+        meshes.box((0.05, length_m, 0.08), wood, (-0.045, 0.0, h * height)) for h in (0.25, 0.75)
+    ]
+    return meshes.join([*boards, *rails])

@@ -1,0 +1,163 @@
+"""Building blocks: primitives as triangle soups, joined and placed.
+
+Solids stand on their `base`, the centre of their lowest face, so that things rest on what is
+below them. Texture coordinates are projected along the axis nearest to each face's normal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import fields, replace
+
+import numpy as np
+import trimesh
+
+from shotenv.world.materials import Material
+from shotenv.world.model import Mesh, Pose
+
+Point = tuple[float, float, float]
+ORIGIN: Point = (0.0, 0.0, 0.0)
+
+
+def soup(corners: np.ndarray, material: Material) -> Mesh:
+    """Triangles [F, 3, 3] in metres, all of one material."""
+    faces = len(corners)
+
+    def per_face(value: float) -> np.ndarray:
+        return np.full(faces, value, dtype=np.float32)
+
+    return Mesh(
+        corners=np.asarray(corners, dtype=np.float32),
+        uv=box_projection(corners, material),
+        albedo_low=per_face(material.albedo_low),
+        albedo_high=per_face(material.albedo_high),
+        retro=per_face(material.retro),
+        emission=per_face(material.emission),
+    )
+
+
+def box_projection(corners: np.ndarray, material: Material) -> np.ndarray:
+    """Texture coordinates [F, 3, 2]: the two axes across the face's main normal axis."""
+    edges = corners[:, 1:] - corners[:, :1]
+    axis = np.abs(np.cross(edges[:, 0], edges[:, 1])).argmax(axis=1)
+    across = np.array([(1, 2), (0, 2), (0, 1)])[axis]
+    metres = np.take_along_axis(corners, across[:, None, :], axis=2)
+    return (metres / material.texture_m + material.offset).astype(np.float32)
+
+
+def join(meshes: Iterable[Mesh]) -> Mesh:
+    """One mesh of all the faces."""
+    parts = list(meshes)
+    return Mesh(
+        **{
+            field.name: np.concatenate([getattr(part, field.name) for part in parts])
+            for field in fields(Mesh)
+        }
+    )
+
+
+def place(mesh: Mesh, pose: Pose) -> Mesh:
+    """`mesh` turned by the pose's yaw about z, then moved."""
+    cos, sin = np.cos(pose.yaw_rad), np.sin(pose.yaw_rad)
+    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    corners = mesh.corners.astype(np.float64) @ turn.T + np.asarray(pose.position_m)
+    return replace(mesh, corners=corners.astype(np.float32))
+
+
+def at(mesh: Mesh, x: float, y: float, z: float = 0.0, yaw: float = 0.0) -> Mesh:
+    """`mesh` turned by `yaw` about z and moved to (x, y, z)."""
+    return place(mesh, Pose((x, y, z), yaw))
+
+
+def scaled(mesh: Mesh, factors: Point) -> Mesh:
+    """`mesh` stretched along each axis."""
+    return replace(mesh, corners=mesh.corners * np.asarray(factors, dtype=np.float32))
+
+
+def polygon(points: Sequence[Point], material: Material) -> Mesh:
+    """A flat convex polygon, corners counter-clockwise seen from its front."""
+    ring = np.asarray(points, dtype=np.float64)
+    fan = [(ring[0], ring[i], ring[i + 1]) for i in range(1, len(ring) - 1)]
+    return soup(np.array(fan), material)
+
+
+def inset(points: Sequence[Point], share: float, lift_m: float) -> np.ndarray:
+    """Corners of a polygon drawn in towards its centre and lifted along its normal."""
+    ring = np.asarray(points, dtype=np.float64)
+    normal = np.cross(ring[1] - ring[0], ring[2] - ring[0])
+    centre = ring.mean(axis=0)
+    drawn = centre + (ring - centre) * (1 - share)
+    return drawn + lift_m * normal / np.linalg.norm(normal)
+
+
+def patch(x: tuple[float, float], y: tuple[float, float], z: float, material: Material) -> Mesh:
+    """A level rectangle facing up."""
+    return polygon([(x[0], y[0], z), (x[1], y[0], z), (x[1], y[1], z), (x[0], y[1], z)], material)
+
+
+def front(y: tuple[float, float], z: tuple[float, float], x: float, material: Material) -> Mesh:
+    """An upright rectangle facing +x."""
+    return polygon([(x, y[0], z[0]), (x, y[1], z[0]), (x, y[1], z[1]), (x, y[0], z[1])], material)
+
+
+def back(y: tuple[float, float], z: tuple[float, float], x: float, material: Material) -> Mesh:
+    """An upright rectangle facing -x."""
+    return polygon([(x, y[1], z[0]), (x, y[0], z[0]), (x, y[0], z[1]), (x, y[1], z[1])], material)
+
+
+def box(size: Point, material: Material, base: Point = ORIGIN) -> Mesh:
+    """A box of `size` whose lowest face is centred on `base`."""
+    x, y, z = base
+    solid = trimesh.creation.box(extents=size)
+    return soup(np.asarray(solid.triangles) + (x, y, z + size[2] / 2), material)
+
+
+def rod(
+    start: Sequence[float],
+    end: Sequence[float],
+    radius: float,
+    material: Material,
+    sections: int = 8,
+) -> Mesh:
+    """A capped cylinder between two points."""
+    solid = trimesh.creation.cylinder(radius=radius, segment=[start, end], sections=sections)
+    return soup(np.asarray(solid.triangles), material)
+
+
+def lathe(
+    profile: Sequence[tuple[float, float]],
+    material: Material,
+    base: Point = ORIGIN,
+    sections: int = 8,
+) -> Mesh:
+    """A solid of revolution about z; `profile` is (radius, height) from bottom to top."""
+    solid = trimesh.creation.revolve(np.asarray(profile, dtype=np.float64), sections=sections)
+    return soup(np.asarray(solid.triangles) + np.asarray(base), material)
+
+
+def ball(radius: float, material: Material, centre: Point, detail: int = 1) -> Mesh:
+    """An icosphere; `detail` 0 has 20 faces, 1 has 80."""
+    solid = trimesh.creation.icosphere(subdivisions=detail, radius=radius)
+    return soup(np.asarray(solid.triangles) + np.asarray(centre), material)
+
+
+def blob(
+    rng: np.random.Generator, radius: float, material: Material, centre: Point, detail: int = 1
+) -> Mesh:
+    """A lumpy ball: each vertex of an icosphere pushed in or out."""
+    solid = trimesh.creation.icosphere(subdivisions=detail, radius=radius)
+    lumps = rng.uniform(0.7, 1.25, size=(len(solid.vertices), 1))
+    vertices = np.asarray(solid.vertices) * lumps + np.asarray(centre)
+    return soup(vertices[np.asarray(solid.faces)], material)
+
+
+def extrude(profile: Sequence[tuple[float, float]], width: float, material: Material) -> Mesh:
+    """A prism: a convex profile of (x, z) points, counter-clockwise seen from -y, along y."""
+    near = [(x, -width / 2, z) for x, z in profile]
+    far = [(x, width / 2, z) for x, z in profile]
+    following = range(1, len(profile) + 1)
+    sides = [
+        polygon([near[i - 1], far[i - 1], far[i % len(far)], near[i % len(far)]][::-1], material)
+        for i in following
+    ]
+    return join([polygon(near, material), polygon(far[::-1], material), *sides])

@@ -1,0 +1,121 @@
+"""Putting things into a world so that nothing collides during a clip.
+
+Every thing has a ground footprint, an axis-aligned rectangle at each instant of the clip. A thing
+is placed only where its footprint stays off the ego vehicle's and off every other thing's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shotenv.config import Family
+from shotenv.world import meshes
+from shotenv.world.model import (
+    MAX_LAMPS,
+    Lamp,
+    Light,
+    Mesh,
+    Motion,
+    MovingObject,
+    Pose,
+    World,
+)
+
+STEP_S = 0.04
+MAX_INSTANTS = 500
+HEADROOM_M = 2.0
+"""Only what is lower than this can be run into."""
+EGO_AHEAD_M = 0.8
+EGO_BESIDE_M = 1.1
+GAP_M = 0.15
+
+
+class Site:
+    """A world in the making: what has been placed, and the ground that is still free.
+
+    Parameters
+    ----------
+    ego : Motion
+        Path of the camera.
+    duration_s : float
+        Length of the clip.
+    night : bool
+        Lamps of streets, windows and cars are on.
+    """
+
+    def __init__(self, ego: Motion, duration_s: float, night: bool = False):
+        self.ego = ego
+        self.night = night
+        instants = int(np.clip(np.ceil(duration_s / STEP_S), 2, MAX_INSTANTS))
+        self.times = np.linspace(0.0, duration_s, instants)
+        self.static: list[Mesh] = []
+        self.moving: list[MovingObject] = []
+        self.lamps: list[Lamp] = []
+        self._taken = [self._ego_footprint()]
+
+    @property
+    def travel_m(self) -> float:
+        """Length of the ego's path."""
+        return self.ego.speed_m_s * float(self.times[-1])
+
+    def build(self, mesh: Mesh) -> None:
+        """Add ground, ceilings and other things that nothing can run into."""
+        self.static.append(mesh)
+
+    def put(self, mesh: Mesh, x: float, y: float, yaw: float = 0.0, z: float = 0.0) -> bool:
+        """Stand a thing at (x, y) on a floor of height `z`; false if there is no room."""
+        pose = Pose((x, y, z), yaw)
+        return self._claim(mesh, [pose]) and not self.static.append(meshes.place(mesh, pose))
+
+    def move(self, mesh: Mesh, motion: Motion) -> bool:
+        """Add a thing that moves; false if its way is not free."""
+        poses = [motion.at(time) for time in self.times]
+        return self._claim(mesh, poses) and not self.moving.append(MovingObject(mesh, motion))
+
+    def world(self, family: Family, seed: int, light: Light) -> World:
+        """The finished world; the nearest lamps are kept if there are too many."""
+        start = np.asarray(self.ego.start.position_m)
+        ahead = start + (self.travel_m / 2 + 4.0, 0.0, 0.0)
+        lamps = (*light.lamps, *self.lamps)
+        nearest = sorted(
+            lamps, key=lambda lamp: (not lamp.rides, np.linalg.norm(lamp.position_m - ahead))
+        )
+        light = Light(
+            light.sun_irradiance,
+            light.sun_direction,
+            light.sky_zenith,
+            light.sky_horizon,
+            tuple(nearest[:MAX_LAMPS]),
+        )
+        return World(family, seed, meshes.join(self.static), tuple(self.moving), light, self.ego)
+
+    def _claim(self, mesh: Mesh, poses: list[Pose]) -> bool:
+        taken = footprints(mesh, poses)
+        if any(overlap(taken, other) for other in self._taken):
+            return False
+        self._taken.append(taken)
+        return True
+
+    def _ego_footprint(self) -> np.ndarray:
+        centres = np.array([self.ego.at(time).position_m[:2] for time in self.times])
+        margin = np.array([EGO_AHEAD_M, EGO_BESIDE_M])
+        return np.stack([centres - margin, centres + margin], axis=1)
+
+
+def footprints(mesh: Mesh, poses: list[Pose]) -> np.ndarray:
+    """Ground rectangles [T, 2, 2] ((low, high), (x, y)) of what is below the headroom."""
+    points = mesh.corners.reshape(-1, 3).astype(np.float64)
+    points = points[points[:, 2] < HEADROOM_M, :2]
+    return np.stack([_rectangle(points, pose) for pose in poses])
+
+
+def _rectangle(points: np.ndarray, pose: Pose) -> np.ndarray:
+    cos, sin = np.cos(pose.yaw_rad), np.sin(pose.yaw_rad)
+    placed = points @ np.array([[cos, sin], [-sin, cos]]) + pose.position_m[:2]
+    return np.stack([placed.min(axis=0), placed.max(axis=0)])
+
+
+def overlap(a: np.ndarray, b: np.ndarray) -> bool:
+    """Whether two footprints come closer than a gap at any instant; static ones have T = 1."""
+    apart = (a[:, 0] > b[:, 1] + GAP_M) | (b[:, 0] > a[:, 1] + GAP_M)
+    return bool((~apart.any(axis=1)).any())

@@ -1,0 +1,149 @@
+"""What moves on a site, and what stands in rows along it. The ego's lane is centred on y = 0."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from shotenv.world import furniture, lights, people, vehicles
+from shotenv.world import materials as m
+from shotenv.world.materials import Range
+from shotenv.world.model import Lamp, Mesh, Motion, Pose
+from shotenv.world.site import Site
+
+HEADLAMP_M2 = 0.05
+HEADLAMP_W_SR = (0.05, 1.0)
+TAIL_RADIANCE = (0.02, 0.2)
+STREET_IRRADIANCE = (1e-3, 2e-2)
+TRIES = 4
+
+
+def walk(
+    site: Site, rng: np.random.Generator, x: float, y: float, yaw: float, z: float = 0.0
+) -> bool:
+    """Somebody on foot at (x, y), standing or walking towards `yaw`."""
+    speed = rng.uniform(0.7, 1.8) if rng.random() < 0.8 else 0.0
+    somebody = people.person(rng, stride_m=0.4 * speed)
+    return site.move(somebody, Motion(Pose((x, y, z), yaw), speed))
+
+
+def walkers(site: Site, rng: np.random.Generator, count: int, y: Range, z: float = 0.0) -> None:
+    """People along the road, either way."""
+    for _ in range(count):
+        yaw = rng.integers(2) * np.pi + rng.uniform(-0.1, 0.1)
+        walk(site, rng, site.travel_m + rng.uniform(2.5, 18.0), rng.uniform(*y), yaw, z)
+
+
+def crossing(site: Site, rng: np.random.Generator, y: Range, near: float = 1.5) -> None:
+    """Up to two people who cross in front of the ego."""
+    for _ in range(rng.integers(0, 3)):
+        side = rng.choice([-1.0, 1.0])
+        yaw = side * (np.pi / 2 + rng.uniform(-0.25, 0.25))
+        for _ in range(TRIES):
+            x = site.travel_m + near + rng.uniform(0.0, 8.0)
+            if walk(site, rng, x, rng.uniform(*y), yaw):
+                break
+
+
+def lead(site: Site, rng: np.random.Generator) -> None:
+    """Perhaps a car ahead in the ego's lane: close behind it in a queue, further off when fast."""
+    if rng.random() < 0.4:
+        return
+    speed = site.ego.speed_m_s * rng.uniform(0.8, 1.15)
+    # The car's own half length comes on top of the gap; braking shortens the gap during the clip.
+    gap = 1.2 + rng.uniform(0.0, 3.0) + 0.8 * site.ego.speed_m_s * rng.uniform(0.3, 1.2)
+    tail = m.log_uniform(rng, TAIL_RADIANCE) if site.night else 0.0
+    vehicle = vehicles.cyclist(rng) if rng.random() < 0.12 else vehicles.car(rng, 0.0, tail)
+    start = Pose((gap + 2.6, rng.uniform(-0.3, 0.3), 0.0))
+    site.move(vehicle, Motion(start, speed))
+
+
+def oncoming(site: Site, rng: np.random.Generator, lane: float) -> None:
+    """Up to two cars in the other lane, coming closer or standing in a queue."""
+    for _ in range(rng.integers(0, 3)):
+        speed = rng.uniform(3.0, 14.0) if rng.random() < 0.75 else 0.0
+        x, y = rng.uniform(5.0, 28.0) + 0.5 * site.travel_m, lane + rng.uniform(-0.2, 0.3)
+        approaching_car(site, rng, Motion(Pose((x, y, 0.0), np.pi), speed))
+
+
+def approaching_car(site: Site, rng: np.random.Generator, motion: Motion) -> None:
+    """A car seen from the front, at night with its head lights on.
+
+    Only a standing car's head lights light other things, because a `Lamp` cannot follow a car.
+    """
+    intensity = m.log_uniform(rng, HEADLAMP_W_SR) if site.night else 0.0
+    mesh = vehicles.car(rng, lights.face_radiance(intensity, HEADLAMP_M2), 0.0)
+    if not site.move(mesh, motion) or not intensity or motion.speed_m_s:
+        return
+    x, y, _ = motion.start.position_m
+    nose = float(mesh.corners[..., 0].max()) + 0.15
+    for side in (-0.6, 0.6):
+        site.lamps.append(
+            Lamp((x - nose, y + side, 0.7), intensity, 0.1, (-1.0, 0.0, -0.03), float(np.cos(0.5)))
+        )
+
+
+def cyclists(site: Site, rng: np.random.Generator, y: float) -> None:
+    """Perhaps somebody on a bicycle at the edge of the lane."""
+    if rng.random() < 0.3:
+        x, speed = site.travel_m * rng.uniform() + rng.uniform(4.0, 12.0), rng.uniform(2.5, 6.5)
+        site.move(vehicles.cyclist(rng), Motion(Pose((x, y - 0.5, 0.0)), speed))
+
+
+def row(
+    site: Site,
+    rng: np.random.Generator,
+    draw: Callable[[np.random.Generator], Mesh],
+    y: float,
+    every_m: float,
+    yaw: float,
+    z: float = 0.0,
+    share: float = 1.0,
+    spread: float = 0.2,
+) -> None:
+    """Things along the road at about equal distances, some left out."""
+    for x in np.arange(rng.uniform(1.0, 1.0 + every_m), site.travel_m + 28.0, every_m):
+        if rng.random() < share:
+            along, across = rng.uniform(-0.15, 0.15) * every_m, rng.uniform(-1, 1) * spread
+            site.put(draw(rng), x + along, y + across, yaw, z)
+
+
+def street_lamps(
+    site: Site, rng: np.random.Generator, y: float, every_m: float, z: float = 0.0
+) -> None:
+    """Lamp posts on the right whose arms reach over the road; by night they shine."""
+    height = rng.uniform(4.5, 7.5)
+    intensity = lights.intensity_for(rng, STREET_IRRADIANCE, height) if site.night else 0.0
+    area = furniture.LAMP_HEAD_M[0] * furniture.LAMP_HEAD_M[1]
+    radiance = lights.face_radiance(intensity, area)
+    for x in np.arange(rng.uniform(-8.0, 8.0), site.travel_m + 50.0, every_m):
+        placed = site.put(furniture.lamp_post(rng, height, radiance), x, y, np.pi / 2, z)
+        if placed and site.night:
+            head = (float(x), y + 1.5, z + height - 0.1)
+            site.lamps.append(Lamp(head, intensity, 0.3, cutoff_cos=float(np.cos(1.25))))
+
+
+def one_of(
+    rng: np.random.Generator, things: tuple[Callable[[np.random.Generator], Mesh], ...]
+) -> Mesh:
+    """Any of several assets."""
+    return things[rng.integers(len(things))](rng)
+
+
+def roadside_thing(rng: np.random.Generator) -> Mesh:
+    """Something from the edge of a country road."""
+    return one_of(
+        rng,
+        (furniture.tree, furniture.tree, furniture.bush, furniture.bush, furniture.sign,
+         furniture.pole, furniture.bollard, furniture.cone),
+    )  # fmt: skip
+
+
+def pavement_thing(rng: np.random.Generator) -> Mesh:
+    """Something from a town's pavement."""
+    return one_of(
+        rng,
+        (furniture.bollard, furniture.sign, furniture.sign, furniture.crate, furniture.bin_,
+         furniture.tree, furniture.bush, furniture.pole, furniture.cone),
+    )  # fmt: skip
