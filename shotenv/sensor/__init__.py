@@ -1,17 +1,18 @@
 """Light becomes electrons, noise and converter words."""
 
-from shotenv.sensor.acquire import acquire, collected_electrons, expose, single_sample_snr
+from shotenv.sensor.acquire import Electrons, acquire, collect, expose, single_sample_snr
 from shotenv.sensor.electrons import electrons_per_radiance_second
 from shotenv.sensor.gray import capture_gray
 from shotenv.sensor.noise import Purpose, draw_noise, stream, stream_seed
 from shotenv.sensor.offsets import OffsetPattern, draw_offsets
 
 __all__ = [
+    "Electrons",
     "OffsetPattern",
     "Purpose",
     "acquire",
     "capture_gray",
-    "collected_electrons",
+    "collect",
     "draw_noise",
     "draw_offsets",
     "electrons_per_radiance_second",

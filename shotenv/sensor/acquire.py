@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import torch
 from torch import Tensor
 
@@ -54,37 +56,60 @@ def expose(
     shots = Shots(shots)
     check_exposure(exposure, shots)
     check_settings(exposure, shots, laser_power_w, integration_s, noise)
-    return acquire(
-        exposure,
-        sensor,
-        shots=shots,
-        laser_power_w=laser_power_w,
-        integration_s=integration_s,
-        noise=noise,
-        offsets=offsets,
+    electrons = collect(exposure, sensor, laser_power_w, integration_s)
+    return acquire(electrons, sensor, shots=shots, noise=noise, offsets=offsets)
+
+
+@dataclass(frozen=True)
+class Electrons:
+    """Noise-free charge of a batch of frames, at the laser power and integration time chosen.
+
+    Attributes
+    ----------
+    active_e, ambient_e : float32 [B, H, W]
+        Active S and ambient B, electrons over both taps in one sample.
+    correlation : float32 [B, 8, H, W]
+        As in `Exposure`.
+    per_correlation_e : float32 [B, 1, 1]
+        Electrons of one sample per unit of `correlation`.
+    """
+
+    active_e: Tensor
+    ambient_e: Tensor
+    correlation: Tensor
+    per_correlation_e: Tensor
+
+
+def collect(
+    exposure: Exposure, sensor: SensorConfig, laser_power_w: Tensor, integration_s: Tensor
+) -> Electrons:
+    """Electrons that each pixel collects in one sample."""
+    rate = electrons_per_radiance_second(sensor)
+    seconds = integration_s[:, None, None]
+    per_radiance = (rate * seconds).to(exposure.ambient.dtype)
+    per_watt = (rate * seconds * laser_power_w[:, None, None]).to(exposure.ambient.dtype)
+    return Electrons(
+        exposure.active * per_watt, exposure.ambient * per_radiance, exposure.correlation, per_watt
     )
 
 
 def acquire(
-    exposure: Exposure,
+    electrons: Electrons,
     sensor: SensorConfig,
     *,
     shots: Shots,
-    laser_power_w: Tensor,
-    integration_s: Tensor,
     noise: Tensor | None,
     offsets: OffsetPattern | None,
 ) -> RawFrame:
-    """`expose` for arrays that are known to be sound."""
-    active_e, ambient_e = collected_electrons(exposure, sensor, laser_power_w, integration_s)
-    pattern_lsb = fixed_pattern_lsb(ambient_e, sensor, offsets)
-    mean_e = active_e.add_(ambient_e).mul_(0.5)
-    half_scale = 0.5 * sensor.contrast * _per_watt(sensor, laser_power_w, integration_s, mean_e)
-    dcs_lsb = torch.empty_like(exposure.correlation[:, :shots])
+    """Noise, full well and converter for charge that is known to be sound; see `expose`."""
+    mean_e = (electrons.active_e + electrons.ambient_e).mul_(0.5)
+    half_scale = electrons.per_correlation_e * (0.5 * sensor.contrast)
+    pattern_lsb = fixed_pattern_lsb(electrons.ambient_e, sensor, offsets)
+    dcs_lsb = torch.empty_like(electrons.correlation[:, :shots])
     fullest_e = torch.zeros_like(mean_e)
     # One sample at a time keeps the working set in the processor's cache.
     for k in range(shots):
-        taps_e = tap_electrons(mean_e, exposure.correlation[:, k] * half_scale)
+        taps_e = tap_electrons(mean_e, electrons.correlation[:, k] * half_scale)
         if noise is not None:
             taps_e = add_noise(taps_e, noise[:, k], sensor.read_noise_e)
         torch.maximum(fullest_e, taps_e[:, 0], out=fullest_e)
@@ -107,8 +132,10 @@ def read_out(taps_e: Tensor, pattern_lsb: Tensor | float, sensor: SensorConfig) 
 def _saturated(fullest_e: Tensor, dcs_lsb: Tensor, sensor: SensorConfig) -> Tensor:
     """Where the fullest tap was full, or a word is at a limit of the converter's range."""
     low, high = signed_limits_lsb(sensor.adc_bits)
-    lowest, highest = dcs_lsb.amin(dim=1), dcs_lsb.amax(dim=1)
-    return (fullest_e >= sensor.full_well_e) | (lowest <= low) | (highest >= high)
+    beyond = fullest_e.sub(sensor.full_well_e)
+    torch.maximum(beyond, dcs_lsb.amax(dim=1).sub_(high), out=beyond)
+    torch.maximum(beyond, dcs_lsb.amin(dim=1).neg_().add_(low), out=beyond)
+    return beyond >= 0
 
 
 def fixed_pattern_lsb(
@@ -120,32 +147,10 @@ def fixed_pattern_lsb(
     return ambient_offset_lsb(ambient_e, sensor).add_(offsets.pattern_lsb)
 
 
-def collected_electrons(
-    exposure: Exposure, sensor: SensorConfig, laser_power_w: Tensor, integration_s: Tensor
-) -> tuple[Tensor, Tensor]:
-    """Active S and ambient B [B, H, W], electrons over both taps in one sample."""
-    like = exposure.ambient
-    active_e = exposure.active * _per_watt(sensor, laser_power_w, integration_s, like)
-    return active_e, like * _per_radiance(sensor, integration_s, like)
-
-
-def single_sample_snr(active_e: Tensor, ambient_e: Tensor, sensor: SensorConfig) -> Tensor:
-    """Signal-to-noise ratio of one sample, `m S / sqrt(S + B + 2 sigma_r^2)`."""
-    variance = (active_e + ambient_e).add_(2.0 * sensor.read_noise_e**2)
-    return variance.rsqrt_().mul_(active_e).mul_(sensor.contrast)
-
-
-def _per_radiance(sensor: SensorConfig, integration_s: Tensor, like: Tensor) -> Tensor:
-    """Electrons [B, 1, 1] of one sample per W m-2 sr-1."""
-    rate = electrons_per_radiance_second(sensor)
-    return (rate * integration_s).to(like.dtype)[:, None, None]
-
-
-def _per_watt(
-    sensor: SensorConfig, laser_power_w: Tensor, integration_s: Tensor, like: Tensor
-) -> Tensor:
-    """Electrons [B, 1, 1] of one sample per W m-2 sr-1 and watt of laser power."""
-    return _per_radiance(sensor, integration_s * laser_power_w, like)
+def single_sample_snr(electrons: Electrons, sensor: SensorConfig) -> Tensor:
+    """Noise-free signal-to-noise ratio of one sample [B, H, W], `m S / sqrt(S + B + 2 sigma_r^2)`."""
+    variance = (electrons.active_e + electrons.ambient_e).add_(2.0 * sensor.read_noise_e**2)
+    return variance.rsqrt_().mul_(electrons.active_e).mul_(sensor.contrast)
 
 
 def check_exposure(exposure: Exposure, shots: Shots) -> None:
