@@ -34,7 +34,7 @@ def made_up_results(difference=(6.0, 2.0, 9.0)):
     zero = {"difference": 0.0, "low": 0.0, "high": 0.0}
     return {
         "policies": policies,
-        "paired_to_best_fixed": {name: zero for name in NAMES} | {"ppo": pair},
+        "paired_to_best_fixed": dict.fromkeys(NAMES, zero) | {"ppo": pair},
         "drives": 24,
         "seeds": list(range(1000, 1024)),
         "versions": {"shotenv": "0.1.0", "torch": "2.13.0"},
@@ -58,7 +58,7 @@ def made_up_timeline(frames=256):
         off[200:220] = warmer
         return {
             "shots": np.where(off, 0, shots).tolist(),
-            "depth_mae_m": [None if o else float(e) for o, e in zip(off, rng.random(frames) * 0.4)],
+            "depth_mae_m": [None if o else float(rng.random() * 0.4) for o in off],
             "temperature_k": (warm + warmer * 3).tolist(),
         }
 
