@@ -141,10 +141,10 @@ def _follow(
     sampler: _Sampler,
 ) -> _Light:
     """Walk every lane's path from the camera, adding the light of each surface hit."""
-    eye = lights.eye
+    eye, passive, instant = lights.eye, lights.passive, lanes.instant
     origin, direction = eye.rays(lanes, sampler.next_2d())
-    hit = scene.hit(origin, direction, lanes.instant, mi.Bool(True))
-    seen = dr.select(hit.valid, hit.emission, lights.passive.sky(direction))
+    hit = scene.hit(origin, direction, instant, mi.Bool(True))
+    seen = dr.select(hit.valid, hit.emission, passive.sky(direction))
     light = _Light(
         distance_m=dr.select(hit.valid, hit.distance_m, dr.inf),
         ambient=dr.select(lights.passive_on, seen, 0),
@@ -153,19 +153,23 @@ def _follow(
     )
     throughput, walked_m = mi.Float(1), hit.distance_m
     for bounce in range(camera.bounces):
-        light.ambient += throughput * lights.passive.reflected(
-            scene, hit, lanes.instant, sampler, hit.valid & lights.passive_on
-        )
-        laser = _laser(scene, eye, hit, lanes.instant, hit.valid & lights.laser_on, bounce == 0)
+        laser = _laser(scene, eye, hit, instant, hit.valid & lights.laser_on, bounce == 0)
         light.add_active(throughput * laser[0], walked_m + laser[1], frequencies_hz)
+        throughput *= hit.albedo
+        passive_on = hit.valid & lights.passive_on
+        irradiance = passive.sun(scene, hit, instant, passive_on)
+        irradiance += passive.lamps(scene, hit, instant, sampler.next_1d(), passive_on)
+        onward = mi.Frame3f(hit.normal).to_world(
+            mi.warp.square_to_cosine_hemisphere(sampler.next_2d())
+        )
         if bounce + 1 < camera.bounces:
-            throughput *= dr.select(hit.valid, hit.albedo, 0)
-            onward = mi.Frame3f(hit.normal).to_world(
-                mi.warp.square_to_cosine_hemisphere(sampler.next_2d())
-            )
-            previous = hit
-            hit = scene.hit(previous.leave, onward, lanes.instant, previous.valid)
+            previous, hit = hit, scene.hit(hit.leave, onward, instant, hit.valid)
             walked_m += dr.norm(hit.point - previous.point)
+            free = passive_on & ~hit.valid
+        else:
+            free = scene.visible(hit.leave, onward, mi.Float(REACH_M), instant, passive_on)
+        sky = dr.select(free, passive.sky(onward), 0)
+        light.ambient += throughput * dr.fma(irradiance, dr.inv_pi, sky)
     return light
 
 

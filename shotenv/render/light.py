@@ -1,4 +1,8 @@
-"""Sun, sky and lamps at a surface: one shadow ray, spent where the light would be strongest."""
+"""Sun, sky and lamps.
+
+Sun and lamps are sought by a shadow ray each, the sky by the rays that the light paths shoot
+anyway: what shades one of them (a roof hides the sky) then adds no noise to the others.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +23,7 @@ _LAMP_NUMBERS = 12
 
 @dataclass(frozen=True)
 class _Choice:
-    """One light kept out of those offered so far, and the sum of what all would give."""
+    """The lamp kept out of those offered so far, and the irradiance that all would give."""
 
     total: Any
     direction: Any
@@ -27,7 +31,7 @@ class _Choice:
     number: Any
 
     def offer(self, irradiance, direction, length) -> _Choice:
-        """Keep the new light with probability `irradiance` over the new total.
+        """Keep the new lamp with probability `irradiance` over the new total.
 
         The random number is stretched back to [0, 1) for the next offer.
         """
@@ -48,8 +52,8 @@ class PassiveLight:
 
     def __init__(self, world: World, instants: Instants):
         light = world.light
-        poses = [world.ego.at(t) for t in instants.times_s]
-        table = np.stack([lamp_table(light.lamps, pose) for pose in poses])
+        start, poses = world.ego.at(0.0), [world.ego.at(t) for t in instants.times_s]
+        table = np.stack([lamp_table(light.lamps, start, pose) for pose in poses])
         self._lamps = mi.Float(table.ravel())
         self._lamp_count = dr.opaque(mi.UInt32, len(light.lamps))
         self._sun_irradiance = dr.opaque(mi.Float, light.sun_irradiance)
@@ -63,29 +67,26 @@ class PassiveLight:
         """Radiance of the sky, W m-2 sr-1: linear in the sine of elevation, the horizon's below."""
         return dr.fma(self._zenith - self._horizon, dr.maximum(direction.z, 0), self._horizon)
 
-    def reflected(self, scene: Scene, hit: Hit, instant, sampler, active):
-        """Radiance that a surface reflects of the light reaching it directly, W m-2 sr-1.
+    def sun(self, scene: Scene, hit: Hit, instant, active):
+        """Irradiance of the sun on a surface, with its shadow, W m-2."""
+        irradiance = self._sun_irradiance * dr.dot(hit.normal, self._sun_direction)
+        lit = active & (irradiance > 0)
+        seen = scene.visible(hit.leave, self._sun_direction, mi.Float(REACH_M), instant, lit)
+        return dr.select(seen, irradiance, 0)
 
-        The irradiance of every light is computed unshadowed (the sky's from one cosine-sampled
-        direction); one light is drawn in proportion, and only that one is tested for shadow:
-        the estimate is the sum of all irradiances where it is seen, 0 where it is not.
+    def lamps(self, scene: Scene, hit: Hit, instant, number, active):
+        """Estimate of the lamps' irradiance on a surface, W m-2, from a random `number`.
+
+        The irradiance of every lamp is computed unshadowed; one lamp is drawn in proportion, and
+        only that one is tested for shadow: the estimate is the sum of all irradiances where the
+        lamp is seen and 0 where it is not, so that no estimate exceeds what is possible.
         """
-        choice = self._choose(hit, instant, sampler, active)
+        choice = self._choose_lamp(hit, instant, number, active)
         lit = active & (choice.total > 0)
         seen = scene.visible(hit.leave, choice.direction, choice.length, instant, lit)
-        return dr.select(seen, hit.albedo * dr.inv_pi * choice.total, 0)
+        return dr.select(seen, choice.total, 0)
 
-    def _choose(self, hit: Hit, instant, sampler, active) -> _Choice:
-        sky_direction = mi.Frame3f(hit.normal).to_world(
-            mi.warp.square_to_cosine_hemisphere(sampler.next_2d())
-        )
-        far = mi.Float(REACH_M)
-        choice = _Choice(dr.pi * self.sky(sky_direction), sky_direction, far, sampler.next_1d())
-        cos_sun = dr.maximum(dr.dot(hit.normal, self._sun_direction), 0)
-        choice = choice.offer(self._sun_irradiance * cos_sun, self._sun_direction, far)
-        return self._offer_lamps(choice, hit, instant, active)
-
-    def _offer_lamps(self, choice: _Choice, hit: Hit, instant, active) -> _Choice:
+    def _choose_lamp(self, hit: Hit, instant, number, active) -> _Choice:
         def more(index, *_):
             return active & (index < self._lamp_count)
 
@@ -94,7 +95,7 @@ class PassiveLight:
             kept = _Choice(*state).offer(*lamp)
             return (index + 1, kept.total, kept.direction, kept.length, kept.number)
 
-        start = (mi.UInt32(0), choice.total, choice.direction, choice.length, choice.number)
+        start = (mi.UInt32(0), mi.Float(0), mi.Vector3f(0, 0, 1), mi.Float(0), number)
         _, *state = dr.while_loop(start, more, offer, label="lamps")
         return _Choice(*state)
 
@@ -120,17 +121,19 @@ def spot_falloff(cos_axis, cutoff_cos):
     return dr.select(cutoff_cos <= -1, 1, t * t * (3 - 2 * t))
 
 
-def lamp_table(lamps: tuple[Lamp, ...], camera: Pose) -> np.ndarray:
+def lamp_table(lamps: tuple[Lamp, ...], start: Pose, camera: Pose) -> np.ndarray:
     """Rows [MAX_LAMPS, 12]: position, intensity, axis, cutoff cosine, radius, zeros.
 
-    Lamps that ride are given in the camera's axes and are put where the camera is.
+    Lamps are where they are at time 0, when the camera is at `start`; those that ride have since
+    moved rigidly with it.
     """
     table = np.zeros((MAX_LAMPS, _LAMP_NUMBERS), np.float32)
-    turn, origin = rotation(camera), np.asarray(camera.position_m)
+    turn = rotation(camera) @ rotation(start).T
     for row, lamp in zip(table, lamps, strict=False):
         position, axis = np.asarray(lamp.position_m), np.asarray(lamp.direction)
         if lamp.rides:
-            position, axis = turn @ position + origin, turn @ axis
+            position = turn @ (position - start.position_m) + camera.position_m
+            axis = turn @ axis
         row[:3], row[3] = position, lamp.intensity_w_sr
         row[4:7], row[7] = axis / np.linalg.norm(axis), lamp.cutoff_cos
         row[8] = lamp.radius_m

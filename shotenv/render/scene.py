@@ -79,7 +79,7 @@ class Scene:
             point=point,
             normal=normal,
             leave=dr.fma(normal, SURFACE_OFFSET_M, point),
-            albedo=dr.fma(high - low, noise, low),
+            albedo=dr.select(valid, dr.fma(high - low, noise, low), 0),
             retro=retro,
             emission=emission,
         )
