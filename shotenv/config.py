@@ -194,19 +194,6 @@ class EnvConfig(Section):
         return self
 
 
-class TrainUnwrapConfig(Section):
-    """Training of an unwrapping network."""
-
-    network: Literal["tofregnet", "tofsegnet"] = Field("tofregnet", description="which network")
-    bank: str = Field("training", description="name or path of the bank to train on")
-    width: int = Field(32, ge=4, le=128, description="channels of the first ResNet stage")
-    epochs: int = Field(60, ge=1, description="passes over the training clips")
-    batch_size: int = Field(32, ge=1, description="frames per step")
-    learning_rate: Positive = Field(1e-3, description="highest learning rate")
-    final_learning_rate: NonNegative = Field(1e-5, description="learning rate at the last step")
-    seed: int = Field(0, ge=0, description="seed of weights, order and augmentation")
-
-
 class AgentConfig(Section):
     """Training of a scheduler with PPO."""
 

@@ -1,0 +1,140 @@
+"""Correction: raw samples and a network's prediction to unwrapped depth.
+
+Two or four samples are decoded and merged with the prediction; eight are unwrapped by their two
+frequencies and need no prediction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+from torch import Tensor
+
+from unwrap.acquisition import SAMPLES_PER_FREQUENCY, Shots
+from unwrap.dual import unwrap_dual
+from unwrap.frames import DepthFrame, RawFrame
+from unwrap.merge import merge_nearest, merge_regression
+from unwrap.phase import decode, distance_m, unambiguous_range_m
+
+Merge = Literal["nearest", "floor"]
+MERGES = {"nearest": merge_nearest, "floor": merge_regression}
+
+
+@dataclass(frozen=True)
+class SensorDescription:
+    """What correction must know of a sensor.
+
+    Attributes
+    ----------
+    f1_hz, f2_hz : float
+        Modulation frequencies.
+    max_range_m : float
+        Range that eight samples are unwrapped over.
+    saturation_range_m : float
+        d_sat of eq. 6 and 8: wrapped distances from here on are not trusted.
+    noise_lsb : float
+        Standard deviation of one sample in the dark, used where no better estimate is given.
+    min_snr : float
+        Amplitude over noise below which a pixel is invalid.
+    max_residual_m : float
+        Disagreement of the two frequencies above which a pixel is invalid. With 24 and 10 MHz
+        candidates within 25 m lie 2.5 m apart, so that 1.25 m is the most there is.
+    """
+
+    f1_hz: float = 24e6
+    f2_hz: float = 10e6
+    max_range_m: float = 25.0
+    saturation_range_m: float = 6.2
+    noise_lsb: float = 1.5
+    min_snr: float = 1.0
+    max_residual_m: float = 1.0
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a network makes of a gray image.
+
+    Attributes
+    ----------
+    distance_m : float32 [B, H, W]
+        Coarse distance, metres.
+    confidence : float32 [B, H, W]
+        0..1, see `unwrap.unwrapper.Unwrapper.predict`.
+    """
+
+    distance_m: Tensor
+    confidence: Tensor
+
+
+def correct(
+    raw: RawFrame,
+    prediction: Prediction | None,
+    sensor: SensorDescription,
+    *,
+    merge: Merge = "nearest",
+    offset_lsb: Tensor | None = None,
+    noise_lsb: Tensor | float | None = None,
+) -> DepthFrame:
+    """Unwrapped depth of a batch of frames with the same number of samples.
+
+    Pixels that are invalid hold the prediction, the best guess there is, or NaN without one.
+
+    Parameters
+    ----------
+    raw : RawFrame
+        Two, four or eight samples.
+    prediction : Prediction or None
+        Coarse distance of the same frames. None is allowed with eight samples.
+    merge : "nearest" or "floor"
+        The nearest wrap candidate, ours, or eq. 6. For TofSegNet, which predicts the middle of a
+        wrap, both are eq. 8, with the middle of the class where the sensor saturates.
+    offset_lsb : float [H, W] or [B, H, W], optional
+        Stored dark-offset map.
+    noise_lsb : float or float [B, H, W], optional
+        Standard deviation of one sample, if known better than `sensor.noise_lsb`.
+
+    Raises
+    ------
+    ValueError
+        Two or four samples without a prediction, an unknown merge, or samples that `decode`
+        refuses.
+    """
+    if merge not in MERGES:
+        raise ValueError(f"merge is {merge!r}; expected one of {', '.join(MERGES)}")
+    first = decode(raw.dcs_lsb[:, :SAMPLES_PER_FREQUENCY], offset_lsb=offset_lsb)
+    noise = sensor.noise_lsb if noise_lsb is None else noise_lsb
+    valid = (first.amplitude >= sensor.min_snr * noise) & ~raw.saturated
+    if raw.shots == Shots.EIGHT:
+        second = decode(raw.dcs_lsb[:, SAMPLES_PER_FREQUENCY:], offset_lsb=offset_lsb)
+        merged_m, residual_m = unwrap_dual(
+            first.phase_rad,
+            second.phase_rad,
+            sensor.f1_hz,
+            sensor.f2_hz,
+            max_range_m=sensor.max_range_m,
+        )
+        valid &= residual_m <= sensor.max_residual_m
+    elif prediction is None:
+        raise ValueError(f"prediction is None; {int(raw.shots)} samples cannot be unwrapped alone")
+    else:
+        merged_m = MERGES[merge](
+            prediction.distance_m,
+            distance_m(first.phase_rad, sensor.f1_hz),
+            unambiguous_range_m(sensor.f1_hz),
+            sensor.saturation_range_m,
+        )
+    return _frame(merged_m, valid, prediction, sensor)
+
+
+def _frame(
+    merged_m: Tensor, valid: Tensor, prediction: Prediction | None, sensor: SensorDescription
+) -> DepthFrame:
+    """Depth with the guess in place of what is invalid, and its whole wraps (0 where NaN)."""
+    guess = merged_m.new_tensor(torch.nan) if prediction is None else prediction.distance_m
+    depth_m = torch.where(valid, merged_m, guess)
+    wraps = depth_m.mul(1 / unambiguous_range_m(sensor.f1_hz))
+    if prediction is None:
+        wraps.nan_to_num_()
+    return DepthFrame(depth_m, wraps.long(), valid)

@@ -1,0 +1,96 @@
+"""Losses of TofRegNet: scale invariant, structural similarity, depth guided, and their sum, eq. 7.
+
+All take prediction and truth [B, H, W] in one unit and return a scalar: the mean over the images.
+Equation numbers are those of Nagiub et al., Near Field iToF LIDAR Depth Improvement from Limited
+Number of Shots (2023).
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+EQUATION_7 = (0.5, 0.4, 0.1)
+"""Weights of the scale-invariant, similarity and depth-guided terms."""
+
+
+def scale_invariant_loss(prediction: Tensor, truth: Tensor, mean_share: float = 1.0) -> Tensor:
+    """mean(d^2) - mean_share * mean(d)^2 of each image, with d = truth - prediction.
+
+    With the paper's `mean_share` of 1 this is the variance of the error, which says nothing about
+    its mean: a depth map too far by any constant costs nothing. Less than 1 ties it down.
+    """
+    difference = (truth - prediction).flatten(1)
+    squares = difference.square().mean(1)
+    return (squares - mean_share * difference.mean(1).square()).mean()
+
+
+def depth_guided_loss(prediction: Tensor, truth: Tensor) -> Tensor:
+    """Mean squared difference over the N = (W // 10) (H // 10) farthest true pixels of each image.
+
+    At least one pixel is used.
+    """
+    height, width = truth.shape[-2:]
+    count = max(1, (width // 10) * (height // 10))
+    farthest = truth.flatten(1).topk(count, dim=1, sorted=False)
+    return (farthest.values - prediction.flatten(1).gather(1, farthest.indices)).square().mean()
+
+
+def ssim_loss(prediction: Tensor, truth: Tensor, data_range: float = 1.0) -> Tensor:
+    """1 - structural similarity (Wang et al. 2004): Gaussian window of 11 pixels, sigma 1.5.
+
+    Only windows that lie inside the image count; images smaller than 11 pixels raise ValueError.
+    """
+    if min(truth.shape[-2:]) < 11:
+        raise ValueError(f"image is {tuple(truth.shape[-2:])}; the similarity window needs 11 x 11")
+    c1, c2 = (0.01 * data_range) ** 2, (0.03 * data_range) ** 2
+    moments = torch.stack((prediction, truth, prediction**2, truth**2, prediction * truth), 1)
+    mean_p, mean_t, square_p, square_t, product = _blur(moments).unbind(1)
+    variances = (square_p - mean_p**2) + (square_t - mean_t**2)
+    covariance = product - mean_p * mean_t
+    luminance = (2 * mean_p * mean_t + c1) / (mean_p**2 + mean_t**2 + c1)
+    structure = (2 * covariance + c2) / (variances + c2)
+    return 1 - (luminance * structure).mean()
+
+
+def _blur(images: Tensor) -> Tensor:
+    """Gaussian window over each channel of [B, C, H, W], without padding."""
+    offsets = torch.arange(-5.0, 6.0, device=images.device)
+    window = torch.exp(-(offsets**2) / (2 * 1.5**2))
+    window = (window / window.sum()).expand(images.shape[1], 1, 1, 11)
+    groups = images.shape[1]
+    across = functional.conv2d(images, window, groups=groups)
+    return functional.conv2d(across, window.transpose(2, 3), groups=groups)
+
+
+def regression_loss(
+    prediction_m: Tensor,
+    truth_m: Tensor,
+    *,
+    range_m: float = 30.0,
+    weights: tuple[float, float, float] = EQUATION_7,
+    mean_share: float = 1.0,
+) -> Tensor:
+    """Eq. 7: 0.5 L_SI + 0.4 L_SSIM + 0.1 L_DG, of depths divided by `range_m`.
+
+    The paper scales depth maps to [0, 1]; `range_m` is the depth that becomes 1.
+    """
+    prediction, truth = prediction_m / range_m, truth_m / range_m
+    terms = (
+        scale_invariant_loss(prediction, truth, mean_share),
+        ssim_loss(prediction, truth),
+        depth_guided_loss(prediction, truth),
+    )
+    return sum(weight * term for weight, term in zip(weights, terms, strict=True))
+
+
+def wrap_loss(prediction_m: Tensor, truth_m: Tensor, unambiguous_m: float) -> Tensor:
+    """Mean of |e| / h and of e^2 / (e^2 + h^2), with h half the unambiguous range; ours, not eq. 7.
+
+    The nearest-candidate merge errs where |e| > h. The second term is that step made smooth, the
+    first pulls pixels that are too far off for the second to feel.
+    """
+    error = (prediction_m - truth_m) / (unambiguous_m / 2)
+    squared = error.square()
+    return (error.abs() + squared / (squared + 1)).mean() / 2

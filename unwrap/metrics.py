@@ -1,0 +1,94 @@
+"""Depth metrics: per image over valid pixels, then the mean over images.
+
+KITTI's development kit and the monodepth lineage both call a different number SqRel; both are
+given, named apart. Predictions are raised to `MIN_DEPTH_M` and true depths below it are left out,
+since iRMSE and the logarithmic error explode near 0.
+"""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+
+MIN_DEPTH_M = 0.1
+"""Smallest depth used, metres."""
+
+
+def depth_metrics(prediction_m: Tensor, truth_m: Tensor, valid: Tensor) -> dict[str, float]:
+    """Errors of depth maps.
+
+    Parameters
+    ----------
+    prediction_m, truth_m : float [B, H, W]
+        Metres; only values at valid pixels are looked at.
+    valid : bool [B, H, W]
+        Pixels to score.
+
+    Returns
+    -------
+    dict
+        With e = prediction - truth and l = ln truth - ln prediction: `mae_m` mean(|e|), `rmse_m`
+        sqrt(mean(e^2)), `irmse_per_km` 1000 sqrt(mean((1 / truth - 1 / prediction)^2)), `abs_rel`
+        mean(|e| / truth), `sq_rel_kitti` mean(e^2 / truth^2), `sq_rel_eigen` mean(e^2 / truth),
+        `silog` 100 sqrt(mean(l^2) - mean(l)^2), `within_0p1m` and `within_0p5m` shares of pixels,
+        `p95_m` the 95th percentile of |e|. Images without valid pixels do not count; all values
+        are NaN where none has any.
+
+    Raises
+    ------
+    ValueError
+        Shapes differ, or `valid` is not bool.
+    """
+    if not (prediction_m.shape == truth_m.shape == valid.shape) or valid.ndim != 3:
+        shapes = [tuple(tensor.shape) for tensor in (prediction_m, truth_m, valid)]
+        raise ValueError(f"prediction_m, truth_m, valid are {shapes}; expected one shape [B, H, W]")
+    if valid.dtype != torch.bool:
+        raise ValueError(f"valid is {valid.dtype}; expected torch.bool")
+    used = valid & (truth_m >= MIN_DEPTH_M)
+    images = [
+        _image_metrics(prediction.clamp(min=MIN_DEPTH_M).double(), truth.double())
+        for prediction, truth in (
+            (prediction_m[i][used[i]], truth_m[i][used[i]]) for i in range(len(used))
+        )
+        if len(truth)
+    ]
+    if not images:
+        return dict.fromkeys(NAMES, math.nan)
+    means = torch.tensor(images, dtype=torch.float64).mean(0).tolist()
+    return dict(zip(NAMES, means, strict=True))
+
+
+NAMES = (
+    "mae_m",
+    "rmse_m",
+    "irmse_per_km",
+    "abs_rel",
+    "sq_rel_kitti",
+    "sq_rel_eigen",
+    "silog",
+    "within_0p1m",
+    "within_0p5m",
+    "p95_m",
+)
+"""Keys of `depth_metrics`, in order."""
+
+
+def _image_metrics(prediction: Tensor, truth: Tensor) -> list[float]:
+    error = prediction - truth
+    absolute, squared = error.abs(), error.square()
+    logarithmic = truth.log() - prediction.log()
+    values = (
+        absolute.mean(),
+        squared.mean().sqrt(),
+        1000 * (1 / truth - 1 / prediction).square().mean().sqrt(),
+        (absolute / truth).mean(),
+        (squared / truth.square()).mean(),
+        (squared / truth).mean(),
+        100 * logarithmic.var(correction=0).sqrt(),
+        (absolute <= 0.1).double().mean(),
+        (absolute <= 0.5).double().mean(),
+        absolute.quantile(0.95),
+    )
+    return [float(value) for value in values]

@@ -1,0 +1,156 @@
+"""Network weights on disk: safetensors with metadata, written atomically, never unpickled.
+
+Convolution kernels are stored as float16, normalisation in float32. The metadata holds what is
+needed to build the network, where it comes from, and a SHA-256 of the tensors.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
+from torch import Tensor, nn
+
+from unwrap.nets import NETWORKS, Autoencoder, TofRegNet, TofSegNet
+
+SCHEMA = "1"
+"""Version of the metadata."""
+MAX_BYTES = 1 << 28
+"""Files larger than this are no networks of this project."""
+
+
+@dataclass(frozen=True)
+class Weights:
+    """A network read from disk.
+
+    Attributes
+    ----------
+    network : Autoencoder
+        In evaluation mode, float32.
+    metadata : dict
+        What was stored with it.
+    fingerprint : str
+        SHA-256 of the tensors, hexadecimal.
+    """
+
+    network: Autoencoder
+    metadata: dict[str, Any]
+    fingerprint: str
+
+
+def save_weights(path: Path, network: nn.Module, metadata: Mapping[str, Any]) -> None:
+    """Write the weights of `network` and `metadata` (plain JSON values) to `path`."""
+    tensors = {name: _stored(tensor) for name, tensor in network.state_dict().items()}
+    values = {"schema": SCHEMA, "sha256": fingerprint(tensors), **metadata}
+    words = {
+        key: value if isinstance(value, str) else json.dumps(value) for key, value in values.items()
+    }
+    write_atomically(path, save(tensors, words))
+
+
+def _stored(tensor: Tensor) -> Tensor:
+    half = tensor.is_floating_point() and tensor.ndim >= 2
+    return tensor.detach().cpu().to(torch.float16 if half else tensor.dtype).contiguous()
+
+
+def fingerprint(tensors: Mapping[str, Tensor]) -> str:
+    """SHA-256 over names, types, shapes and bytes of the tensors."""
+    digest = hashlib.sha256()
+    for name in sorted(tensors):
+        tensor = tensors[name]
+        digest.update(f"{name} {tensor.dtype} {tuple(tensor.shape)}".encode())
+        digest.update(tensor.contiguous().numpy().tobytes())
+    return digest.hexdigest()
+
+
+def load_weights(path: Path) -> Weights:
+    """Read a network.
+
+    Raises
+    ------
+    ValueError
+        The file is missing, damaged, no safetensors file, or no network of this project; the
+        message names the file and the cure.
+    """
+    cure = "train it again (`shotenv unwrap train`) or fetch it again"
+    try:
+        if not path.is_file():
+            raise ValueError("no such file")
+        if path.stat().st_size > MAX_BYTES:
+            raise ValueError(f"more than {MAX_BYTES >> 20} MiB")
+        with safe_open(path, framework="pt") as file:
+            words = dict(file.metadata() or {})
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        return _built(words, tensors)
+    except (ValueError, TypeError, KeyError, OSError, RuntimeError, SafetensorError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise ValueError(f"{path}: unusable network file ({reason}); {cure}") from None
+
+
+def _built(words: Mapping[str, str], tensors: Mapping[str, Tensor]) -> Weights:
+    if words.get("schema") != SCHEMA:
+        raise ValueError(f"schema is {words.get('schema')!r}; expected {SCHEMA!r}")
+    digest = fingerprint(tensors)
+    if words["sha256"] != digest:
+        raise ValueError("its tensors do not match its checksum")
+    metadata = {key: _value(word) for key, word in words.items()}
+    network = build(metadata)
+    network.load_state_dict({name: tensor.to(_type_in(tensor)) for name, tensor in tensors.items()})
+    return Weights(network.eval(), metadata, digest)
+
+
+def _value(word: str) -> Any:
+    try:
+        return json.loads(word)
+    except ValueError:
+        return word
+
+
+def _type_in(tensor: Tensor) -> torch.dtype:
+    return torch.float32 if tensor.is_floating_point() else tensor.dtype
+
+
+def build(metadata: Mapping[str, Any]) -> Autoencoder:
+    """The untrained network that `metadata` describes.
+
+    Raises
+    ------
+    ValueError
+        An unknown network, or a width, class count or range outside what is possible.
+    """
+    name, width = metadata["network"], metadata["width"]
+    if name not in NETWORKS:
+        raise ValueError(f"network is {name!r}; expected one of {', '.join(NETWORKS)}")
+    if not (isinstance(width, int) and 4 <= width <= 128):
+        raise ValueError(f"width is {width!r}; expected a whole number from 4 to 128")
+    if name == "tofregnet":
+        return TofRegNet(width, float(metadata["range_m"]))
+    classes = metadata["classes"]
+    if not (isinstance(classes, int) and 2 <= classes <= 16):
+        raise ValueError(f"classes is {classes!r}; expected a whole number from 2 to 16")
+    return TofSegNet(width, classes)
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write beside `path`, flush, rename: under the final name there is never half a file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.NamedTemporaryFile(
+        dir=path.parent, prefix=f".{path.name}.", delete=False
+    ) as file:
+        try:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+            Path(file.name).replace(path)
+        except BaseException:
+            Path(file.name).unlink(missing_ok=True)
+            raise
