@@ -20,7 +20,7 @@ class Instants:
         Whether the laser, and whether sun, sky and lamps are rendered at the instant.
     draw : tuple of int, T
         Instants with the same number share their random numbers, so that they differ by what
-        moved and not by Monte Carlo noise.
+        moved and not by Monte Carlo noise. Counted from 0.
     """
 
     times_s: tuple[float, ...]
@@ -46,5 +46,5 @@ def frame_instants(time_s: float, camera: CameraConfig, sensor: SensorConfig) ->
         times_s=(*samples, *gray),
         laser=laser,
         passive=tuple(not on for on in laser),
-        draw=(0,) * len(samples) + tuple(range(1, gray_count + 1)),
+        draw=(0,) * len(samples) + tuple(range(gray_count)),
     )

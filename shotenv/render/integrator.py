@@ -15,6 +15,7 @@ from shotenv.render.geometry import REACH_M, geometry_at
 from shotenv.render.instants import Instants
 from shotenv.render.light import PassiveLight
 from shotenv.render.pinhole import Pinhole
+from shotenv.render.sampling import Lanes, Sampler
 from shotenv.render.scene import SURFACE_OFFSET_M, Hit, Scene
 from shotenv.world.model import World
 
@@ -67,42 +68,10 @@ def trace(
         dr.gather(mi.Bool, mi.Bool(list(instants.passive)), lanes.instant),
     )
     scene = Scene(geometry_at(world, instants.times_s, camera.bounces))
-    light = _follow(scene, lights, lanes, camera, frequencies_hz, _Sampler(lanes, instants, seed))
+    light = _follow(
+        scene, lights, lanes, camera, frequencies_hz, Sampler(lanes, instants, camera, seed=seed)
+    )
     return _collect(light, lanes, len(instants), camera)
-
-
-@dataclass(frozen=True)
-class Lanes:
-    """What each lane of the wavefront renders: an instant, a pixel and a sample of it."""
-
-    instant: Any
-    pixel: Any
-    sample: Any
-
-    @classmethod
-    def of(cls, instants: int, camera: CameraConfig) -> Lanes:
-        """All lanes, samples of a pixel side by side."""
-        pixels, samples = camera.width * camera.height, camera.samples_per_pixel
-        lane = dr.arange(mi.UInt32, instants * pixels * samples)
-        place = lane // samples
-        return cls(place // pixels, place % pixels, lane % samples)
-
-
-class _Sampler:
-    """Random numbers of each lane; instants of one draw get the same."""
-
-    def __init__(self, lanes: Lanes, instants: Instants, seed: int):
-        state = np.random.SeedSequence(seed).generate_state(1)
-        draw = dr.gather(mi.UInt32, mi.UInt32(list(instants.draw)), lanes.instant)
-        key = dr.opaque(mi.UInt32, int(state[0])) ^ (draw * 0x9E3779B9)
-        first, second = mi.sample_tea_32(key, lanes.pixel * 4096 + lanes.sample)
-        self._rng = mi.PCG32(1, mi.UInt64(first), mi.UInt64(second))
-
-    def next_1d(self):
-        return self._rng.next_float32()
-
-    def next_2d(self):
-        return mi.Point2f(self.next_1d(), self.next_1d())
 
 
 @dataclass(frozen=True)
@@ -138,7 +107,7 @@ def _follow(
     lanes: Lanes,
     camera: CameraConfig,
     frequencies_hz: Sequence[float],
-    sampler: _Sampler,
+    sampler: Sampler,
 ) -> _Light:
     """Walk every lane's path from the camera, adding the light of each surface hit."""
     eye, passive, instant = lights.eye, lights.passive, lanes.instant

@@ -1,0 +1,68 @@
+"""Which lane of the wavefront renders what, and with which random numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from shotenv.config import CameraConfig
+from shotenv.render.instants import Instants
+
+# Additive recurrences of low discrepancy in one and two dimensions: the inverse powers of the
+# golden ratio and of the plastic number.
+_STEP_1D = 0.6180339887498949
+_STEP_2D = (0.7548776662466927, 0.5698402909980532)
+
+
+@dataclass(frozen=True)
+class Lanes:
+    """What each lane of the wavefront renders: an instant, a pixel and a sample of it."""
+
+    instant: Any
+    pixel: Any
+    sample: Any
+
+    @classmethod
+    def of(cls, instants: int, camera: CameraConfig) -> Lanes:
+        """All lanes, samples of a pixel side by side."""
+        pixels, samples = camera.width * camera.height, camera.samples_per_pixel
+        lane = dr.arange(mi.UInt32, instants * pixels * samples)
+        place = lane // samples
+        return cls(place // pixels, place % pixels, lane % samples)
+
+
+class Sampler:
+    """Random numbers that cover the unit interval or square evenly over a pixel's samples.
+
+    The samples of a pixel, over all draws, are one low-discrepancy sequence, shifted at random
+    and shuffled anew for each number asked for. Instants of one draw get the same numbers.
+    """
+
+    def __init__(self, lanes: Lanes, instants: Instants, camera: CameraConfig, *, seed: int):
+        key = dr.opaque(mi.UInt32, int(np.random.SeedSequence(seed).generate_state(1)[0]))
+        first, second = mi.sample_tea_32(key, lanes.pixel)
+        self._rng = mi.PCG32(1, mi.UInt64(first), mi.UInt64(second))
+        draw = dr.gather(mi.UInt32, mi.UInt32(list(instants.draw)), lanes.instant)
+        self._index = draw * camera.samples_per_pixel + lanes.sample
+        count = (max(instants.draw) + 1) * camera.samples_per_pixel
+        self._shuffle_mask = (1 << (count - 1).bit_length()) - 1
+
+    def next_1d(self):
+        """A number in [0, 1)."""
+        return _wrap(self._order() * _STEP_1D + self._rng.next_float32())
+
+    def next_2d(self):
+        """A point of the unit square."""
+        order = self._order()
+        return mi.Point2f([_wrap(order * step + self._rng.next_float32()) for step in _STEP_2D])
+
+    def _order(self):
+        return mi.Float(self._index ^ (self._rng.next_uint32() & self._shuffle_mask))
+
+
+def _wrap(value):
+    return value - dr.floor(value)
