@@ -1,7 +1,8 @@
 """Sun, sky and lamps.
 
 Sun and lamps are sought by a shadow ray each, the sky by the rays that the light paths shoot
-anyway: what shades one of them (a roof hides the sky) then adds no noise to the others.
+anyway: what shades one of them (a roof hides the sky) then adds no noise to the others. Deep
+indoors those rays would hardly ever find the sky, so the sun's ray aims at the opening.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from shotenv.render.geometry import REACH_M, rotation
 from shotenv.render.instants import Instants
 from shotenv.render.scene import Hit, Scene
-from shotenv.world.model import MAX_LAMPS, Lamp, Pose, World
+from shotenv.world.model import MAX_LAMPS, Indoor, Lamp, Pose, World
 
 _LAMP_NUMBERS = 12
 
@@ -56,6 +57,7 @@ class PassiveLight:
         table = np.stack([lamp_table(light.lamps, start, pose) for pose in poses])
         self._lamps = mi.Float(table.ravel())
         self._lamp_count = dr.opaque(mi.UInt32, len(light.lamps))
+        self._opening = _Opening(light.indoor)
         self._sun_irradiance = dr.opaque(mi.Float, light.sun_irradiance)
         self._sun_direction = mi.Vector3f(
             [dr.opaque(mi.Float, number) for number in light.sun_direction]
@@ -67,12 +69,30 @@ class PassiveLight:
         """Radiance of the sky, W m-2 sr-1: linear in the sine of elevation, the horizon's below."""
         return dr.fma(self._zenith - self._horizon, dr.maximum(direction.z, 0), self._horizon)
 
-    def sun(self, scene: Scene, hit: Hit, instant, active):
-        """Irradiance of the sun on a surface, with its shadow, W m-2."""
-        irradiance = self._sun_irradiance * dr.dot(hit.normal, self._sun_direction)
-        lit = active & (irradiance > 0)
-        seen = scene.visible(hit.leave, self._sun_direction, mi.Float(REACH_M), instant, lit)
-        return dr.select(seen, irradiance, 0)
+    def daylight(self, scene: Scene, hit: Hit, instant, sampler, active):
+        """Irradiance of the sun on a surface, with its shadow, W m-2; deep indoors also the sky's.
+
+        Indoors, daylight comes through the opening: the sky is sampled there, and one of sun and
+        sky is drawn in proportion to their unshadowed irradiance.
+        """
+        choice = self._sky_through_opening(hit, sampler.next_2d(), sampler.next_1d())
+        sun = self._sun_irradiance * dr.maximum(dr.dot(hit.normal, self._sun_direction), 0)
+        sun = dr.select(self._opening.lets_in(hit.point, self._sun_direction), sun, 0)
+        choice = choice.offer(sun, self._sun_direction, mi.Float(REACH_M))
+        lit = active & (choice.total > 0)
+        seen = scene.visible(hit.leave, choice.direction, choice.length, instant, lit)
+        return dr.select(seen, choice.total, 0)
+
+    def sky_is_aimed_at(self, hit: Hit):
+        """Whether `daylight` holds the sky's light on this surface already."""
+        return self._opening.is_far(hit.point)
+
+    def _sky_through_opening(self, hit: Hit, sample, number) -> _Choice:
+        direction, solid_angle = self._opening.aim(hit.point, sample)
+        cosine = dr.maximum(dr.dot(hit.normal, direction), 0)
+        above = self._opening.is_far(hit.point) & (direction.z > 0)
+        irradiance = dr.select(above, self.sky(direction) * cosine * solid_angle, 0)
+        return _Choice(irradiance, direction, mi.Float(REACH_M), number)
 
     def lamps(self, scene: Scene, hit: Hit, instant, number, active):
         """Estimate of the lamps' irradiance on a surface, W m-2, from a random `number`.
@@ -113,6 +133,48 @@ class PassiveLight:
         irradiance = intensity * falloff * cos_surface / (square + dr.square(radius))
         # The lamp's own housing is within its radius and throws no shadow.
         return irradiance, direction, dr.maximum(distance - radius, 0)
+
+
+class _Opening:
+    """Where daylight enters a roofed box: a rectangle in the plane of the box's far end.
+
+    Without a box nothing is indoors; without an opening its area is 0, and it lets in nothing.
+    """
+
+    def __init__(self, indoor: Indoor | None):
+        low, high = (indoor.low, indoor.high) if indoor else ((1.0,) * 3, (0.0,) * 3)
+        corners = (indoor and indoor.opening) or ((0.0, 0.0), (0.0, 0.0))
+        self._low, self._high = _opaque_point(low), _opaque_point(high)
+        self._from, self._to = (_opaque_point((high[0], *corner)) for corner in corners)
+        self._size = self._to - self._from
+        self._area = self._size.y * self._size.z
+
+    def _is_indoors(self, point):
+        return dr.all(point > self._low) & dr.all(point < self._high)
+
+    def is_far(self, point):
+        """Whether a point is indoors, and so far in that rays at random would miss the opening."""
+        centre = self._from + self._size * 0.5
+        return self._is_indoors(point) & (self._area < dr.squared_norm(centre - point))
+
+    def aim(self, point, sample):
+        """Direction to a point of the opening drawn evenly, and the solid angle it stands for."""
+        target = self._from + self._size * mi.Vector3f(0, sample.x, sample.y)
+        away = target - point
+        square = dr.maximum(dr.squared_norm(away), 1e-6)
+        direction = away * dr.rsqrt(square)
+        return direction, self._area * dr.maximum(direction.x, 0) / square
+
+    def lets_in(self, point, direction):
+        """Whether a point is outdoors, or a ray from it in this direction leaves by the opening."""
+        crossing = point + (self._from.x - point.x) / direction.x * direction
+        through = (crossing.y > self._from.y) & (crossing.y < self._to.y)
+        through &= (crossing.z > self._from.z) & (crossing.z < self._to.z)
+        return ~self._is_indoors(point) | (through & (direction.x > 0))
+
+
+def _opaque_point(numbers):
+    return mi.Point3f([dr.opaque(mi.Float, float(number)) for number in numbers])
 
 
 def spot_falloff(cos_axis, cutoff_cos):

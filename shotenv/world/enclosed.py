@@ -6,7 +6,7 @@ import numpy as np
 
 from shotenv.world import buildings, furniture, lights, meshes, vehicles
 from shotenv.world import materials as m
-from shotenv.world.model import Lamp, Motion, Pose
+from shotenv.world.model import Indoor, Lamp, Motion, Pose
 from shotenv.world.roads import BEHIND_M, PAINT_M, REACH_M
 from shotenv.world.site import Site
 from shotenv.world.traffic import approaching_car, crossing, lead, pavement_thing, row, walkers
@@ -81,12 +81,15 @@ def end_wall(
     site: Site, rng: np.random.Generator, end: float, half: float, height: float, wall: m.Material
 ) -> None:
     """Closed, or a parapet with daylight above it; outside there are trees and ground."""
+    box = (-BEHIND_M, -half - 1.0, -1.0), (end, half + 1.0, height + SLAB_M)
     if rng.random() < 0.55:
+        site.indoor = Indoor(*box, None)
         site.put(meshes.box((0.3, 2 * half, height), wall), end + 0.15, 0.0)
         band = meshes.back((-half, half), (0.5, 0.75), end - 0.012, m.WHITE_PAINT.draw(rng))
         site.build(band)
         return
     parapet, lintel = rng.uniform(0.7, 1.1), rng.uniform(0.2, 0.5)
+    site.indoor = Indoor(*box, ((-half, parapet), (half, height - lintel)))
     site.put(meshes.box((0.3, 2 * half, parapet), wall), end + 0.15, 0.0)
     site.build(meshes.box((0.3, 2 * half, lintel), wall, (end + 0.15, 0.0, height - lintel)))
     site.build(
@@ -160,6 +163,11 @@ def tunnel(site: Site, rng: np.random.Generator, irradiance: m.Range) -> None:
     tube(site, rng, section, centre, exit_x)
     kerbs_and_paint(site, rng, centre, half, lane, exit_x)
     height = max(z for _, z in section)
+    site.indoor = Indoor(
+        (-BEHIND_M, centre - half, -1.0),
+        (exit_x, centre + half, height),
+        ((centre - half, 0.0), (centre + half, height)),
+    )
     ceiling_lamps(site, rng, (-12.0, exit_x), height - 0.05, irradiance, (centre,))
     wall_things(site, rng, centre - half, exit_x)
     outside(site, rng, centre, half, exit_x)

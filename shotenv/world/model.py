@@ -97,6 +97,25 @@ class Lamp:
 
 
 @dataclass(frozen=True)
+class Indoor:
+    """A roofed box that daylight enters through one opening at most, at its far end.
+
+    Renderers aim at the opening: daylight that has to find it by chance is noise.
+
+    Attributes
+    ----------
+    low, high : (x, y, z)
+        Corners of the box, metres.
+    opening : ((y, z), (y, z)) or None
+        Lower and upper corner of the opening in the plane x = high[0].
+    """
+
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+    opening: tuple[tuple[float, float], tuple[float, float]] | None
+
+
+@dataclass(frozen=True)
 class Light:
     """All passive light in band.
 
@@ -110,6 +129,8 @@ class Light:
         Sky radiance overhead and at the horizon, W m-2 sr-1, linear in the sine of elevation.
     lamps : tuple of Lamp
         At most `MAX_LAMPS`.
+    indoor : Indoor or None
+        The roofed part of the world, if any.
     """
 
     sun_irradiance: float
@@ -117,6 +138,7 @@ class Light:
     sky_zenith: float
     sky_horizon: float
     lamps: tuple[Lamp, ...]
+    indoor: Indoor | None = None
 
 
 MAX_LAMPS = 16

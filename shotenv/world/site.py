@@ -6,12 +6,15 @@ is placed only where its footprint stays off the ego vehicle's and off every oth
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from shotenv.config import Family
 from shotenv.world import meshes
 from shotenv.world.model import (
     MAX_LAMPS,
+    Indoor,
     Lamp,
     Light,
     Mesh,
@@ -25,9 +28,11 @@ STEP_S = 0.04
 MAX_INSTANTS = 500
 HEADROOM_M = 2.0
 """Only what is lower than this can be run into."""
-EGO_AHEAD_M = 0.8
+EGO_AHEAD_M = 0.5
 EGO_BESIDE_M = 1.1
 GAP_M = 0.15
+MAX_TRIANGLES = 6000
+"""Things are left out once a world has as many."""
 
 
 class Site:
@@ -51,7 +56,14 @@ class Site:
         self.static: list[Mesh] = []
         self.moving: list[MovingObject] = []
         self.lamps: list[Lamp] = []
+        self.indoor: Indoor | None = None
+        self.room = np.array([[-np.inf, -np.inf], [np.inf, np.inf]])
         self._taken = [self._ego_footprint()]
+        self._triangles = 0
+
+    def enclose(self, x: tuple[float, float], y: tuple[float, float]) -> None:
+        """From now on keep things inside a rectangle."""
+        self.room = np.array([x, y]).T
 
     @property
     def travel_m(self) -> float:
@@ -60,6 +72,7 @@ class Site:
 
     def build(self, mesh: Mesh) -> None:
         """Add ground, ceilings and other things that nothing can run into."""
+        self._triangles += len(mesh.corners)
         self.static.append(mesh)
 
     def put(self, mesh: Mesh, x: float, y: float, yaw: float = 0.0, z: float = 0.0) -> bool:
@@ -74,26 +87,22 @@ class Site:
 
     def world(self, family: Family, seed: int, light: Light) -> World:
         """The finished world; the nearest lamps are kept if there are too many."""
-        start = np.asarray(self.ego.start.position_m)
-        ahead = start + (self.travel_m / 2 + 4.0, 0.0, 0.0)
+        ahead = np.array([self.travel_m / 2 + 4.0, 0.0, 0.0])
         lamps = (*light.lamps, *self.lamps)
         nearest = sorted(
             lamps, key=lambda lamp: (not lamp.rides, np.linalg.norm(lamp.position_m - ahead))
         )
-        light = Light(
-            light.sun_irradiance,
-            light.sun_direction,
-            light.sky_zenith,
-            light.sky_horizon,
-            tuple(nearest[:MAX_LAMPS]),
-        )
+        light = replace(light, lamps=tuple(nearest[:MAX_LAMPS]), indoor=self.indoor)
         return World(family, seed, meshes.join(self.static), tuple(self.moving), light, self.ego)
 
     def _claim(self, mesh: Mesh, poses: list[Pose]) -> bool:
         taken = footprints(mesh, poses)
-        if any(overlap(taken, other) for other in self._taken):
+        inside = (taken[:, 0] >= self.room[0]).all() and (taken[:, 1] <= self.room[1]).all()
+        fits = self._triangles + len(mesh.corners) <= MAX_TRIANGLES
+        if not (inside and fits) or any(overlap(taken, other) for other in self._taken):
             return False
         self._taken.append(taken)
+        self._triangles += len(mesh.corners)
         return True
 
     def _ego_footprint(self) -> np.ndarray:
@@ -106,13 +115,12 @@ def footprints(mesh: Mesh, poses: list[Pose]) -> np.ndarray:
     """Ground rectangles [T, 2, 2] ((low, high), (x, y)) of what is below the headroom."""
     points = mesh.corners.reshape(-1, 3).astype(np.float64)
     points = points[points[:, 2] < HEADROOM_M, :2]
-    return np.stack([_rectangle(points, pose) for pose in poses])
-
-
-def _rectangle(points: np.ndarray, pose: Pose) -> np.ndarray:
-    cos, sin = np.cos(pose.yaw_rad), np.sin(pose.yaw_rad)
-    placed = points @ np.array([[cos, sin], [-sin, cos]]) + pose.position_m[:2]
-    return np.stack([placed.min(axis=0), placed.max(axis=0)])
+    (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
+    outline = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    yaw = np.array([pose.yaw_rad for pose in poses])
+    turn = np.moveaxis(np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]]), -1, 0)
+    placed = outline @ turn + np.array([pose.position_m[:2] for pose in poses])[:, None]
+    return np.stack([placed.min(axis=1), placed.max(axis=1)], axis=1)
 
 
 def overlap(a: np.ndarray, b: np.ndarray) -> bool:
