@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import torch
 from torch import Tensor
 
 from shotenv.config import LaserConfig
@@ -73,14 +72,3 @@ def thermal_step(
 def trip_step(tripped: Array, temperature_k: Array, laser: LaserConfig) -> Array:
     """Whether the laser is off in the next frame: on at `trip_k`, back below `release_k`."""
     return (temperature_k >= laser.trip_k) | (tripped & (temperature_k >= laser.release_k))
-
-
-def heat_margin(temperature_k: Tensor, tripped: Tensor, laser: LaserConfig) -> Tensor:
-    """Margin to the trip in units of the hysteresis.
-
-    Positive while the laser works (0 at the trip); negative while it is off (0 at the release).
-    """
-    span_k = laser.trip_k - laser.release_k
-    working = (laser.trip_k - temperature_k) / span_k
-    waiting = (laser.release_k - temperature_k) / span_k
-    return torch.where(tripped, waiting, working)

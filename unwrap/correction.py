@@ -14,7 +14,7 @@ from torch import Tensor
 
 from unwrap.acquisition import SAMPLES_PER_FREQUENCY, Shots
 from unwrap.dual import unwrap_dual
-from unwrap.frames import DepthFrame, RawFrame
+from unwrap.frames import DepthFrame, PhaseFrame, RawFrame
 from unwrap.merge import merge_nearest, merge_regression
 from unwrap.phase import decode, distance_m, unambiguous_range_m
 
@@ -125,11 +125,15 @@ def correct(
             unambiguous_range_m(sensor.f1_hz),
             sensor.saturation_range_m,
         )
-    return _frame(merged_m, valid, prediction, sensor)
+    return _frame(merged_m, valid, first, prediction, sensor)
 
 
 def _frame(
-    merged_m: Tensor, valid: Tensor, prediction: Prediction | None, sensor: SensorDescription
+    merged_m: Tensor,
+    valid: Tensor,
+    first: PhaseFrame,
+    prediction: Prediction | None,
+    sensor: SensorDescription,
 ) -> DepthFrame:
     """Depth with the guess in place of what is invalid, and its whole wraps (0 where NaN)."""
     guess = merged_m.new_tensor(torch.nan) if prediction is None else prediction.distance_m
@@ -137,4 +141,4 @@ def _frame(
     wraps = depth_m.mul(1 / unambiguous_range_m(sensor.f1_hz))
     if prediction is None:
         wraps.nan_to_num_()
-    return DepthFrame(depth_m, wraps.long(), valid)
+    return DepthFrame(depth_m, wraps.long(), valid, first.amplitude, first.residual)

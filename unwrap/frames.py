@@ -64,8 +64,14 @@ class DepthFrame:
         Number of whole unambiguous ranges at f1 in `distance_m`.
     valid : bool [B, H, W]
         Signal strong enough, not saturated, frequencies agree.
+    amplitude : float32 [B, H, W]
+        Amplitude of the correlation at f1, in the unit of the samples.
+    residual : float32 [B, H, W] or None
+        Of the opposite samples at f1, see `PhaseFrame`; None with two samples.
     """
 
     distance_m: Tensor
     wraps: Tensor
     valid: Tensor
+    amplitude: Tensor
+    residual: Tensor | None

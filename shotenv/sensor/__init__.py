@@ -2,7 +2,7 @@
 
 from shotenv.sensor.acquire import Electrons, acquire, collect, expose, single_sample_snr
 from shotenv.sensor.electrons import electrons_per_radiance_second
-from shotenv.sensor.gray import capture_gray
+from shotenv.sensor.gray import capture_gray, sample_noise_lsb
 from shotenv.sensor.noise import Purpose, draw_noise, stream, stream_seed
 from shotenv.sensor.offsets import OffsetPattern, draw_offsets
 
@@ -17,6 +17,7 @@ __all__ = [
     "draw_offsets",
     "electrons_per_radiance_second",
     "expose",
+    "sample_noise_lsb",
     "single_sample_snr",
     "stream",
     "stream_seed",

@@ -148,7 +148,7 @@ def fixed_pattern_lsb(
 
 
 def single_sample_snr(electrons: Electrons, sensor: SensorConfig) -> Tensor:
-    """Noise-free signal-to-noise ratio of one sample [B, H, W], `m S / sqrt(S + B + 2 sigma_r^2)`."""
+    """Noise-free signal to noise of one sample [B, H, W]: `m S / sqrt(S + B + 2 sigma_r^2)`."""
     variance = (electrons.active_e + electrons.ambient_e).add_(2.0 * sensor.read_noise_e**2)
     return variance.rsqrt_().mul_(electrons.active_e).mul_(sensor.contrast)
 

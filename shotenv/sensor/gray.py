@@ -53,3 +53,16 @@ def gray_exposure_s(ambient: Tensor, sensor: SensorConfig) -> Tensor:
 def gray_gain_lsb_per_e(sensor: SensorConfig) -> float:
     """Converter gain of the gray image: one full tap is full scale, LSB per electron."""
     return full_scale_lsb(sensor.adc_bits) / sensor.full_well_e
+
+
+def sample_noise_lsb(
+    gray: Tensor, exposure_s: Tensor, integration_s: Tensor, sensor: SensorConfig
+) -> Tensor:
+    """Noise of one sample as the sensor itself can tell it, float32 [B, H, W], LSB.
+
+    Ambient shot noise, from the gray image, and read noise: `sqrt(B + 2 sigma_r^2)`. The laser's
+    own shot noise is left out; it matters only where the signal is strong anyway.
+    """
+    per_word_e = integration_s / (exposure_s * gray_gain_lsb_per_e(sensor))
+    ambient_e = gray.to(torch.float32) * per_word_e.to(torch.float32)[:, None, None]
+    return ambient_e.add_(2.0 * sensor.read_noise_e**2).sqrt_().mul_(sensor.gain_lsb_per_e)

@@ -1,0 +1,301 @@
+"""The transition of the decision problem: pure, batched; state goes in and comes out.
+
+problem = open_problem(config)
+state = reset(problem, seeds)
+state, outcome = step(problem, state, actions)
+features = observe(problem, state)
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from shotenv.batch import concatenate, put, take
+from shotenv.drive import Drive, draw_drive
+from shotenv.frames import ShotCost
+from shotenv.laser import shot_cost, thermal_step, trip_step
+from shotenv.measure import Measured, measure, noise_of
+from shotenv.observe import FEATURES, LIMIT, SEEN_FEATURES, gray_change
+from shotenv.problem import Problem, open_problem
+from shotenv.reward import DepthScore, no_depth, reward, reward_terms
+from unwrap.acquisition import Shots
+
+__all__ = ["Outcome", "Outcomes", "Problem", "Seen", "State", "observe", "open_problem"]
+__all__ += ["outcomes_of_all_actions", "reset", "step"]
+
+SHOTS_OF_ACTION = torch.tensor([int(shots) for shots in Shots])
+NEVER = 1000
+"""Frames since an acquisition that has not been made."""
+RECENT_S = 1.0
+"""Time constant of the averages of duty and power."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What earlier frames told; batch B.
+
+    Attributes
+    ----------
+    features : float32 [B, 6]
+        Of the last acquisition that could tell, see `SEEN_FEATURES`; 0 before the first.
+    shots : int64 [B]
+        Of the last frame; 0 without laser, or before the first frame.
+    since_four, since_eight : int64 [B]
+        Frames since the last one with at least 4, and with 8 shots.
+    duty, power : float64 [B]
+        Exponential averages over `RECENT_S`, relative to always 8.
+    """
+
+    features: Tensor
+    shots: Tensor
+    since_four: Tensor
+    since_eight: Tensor
+    duty: Tensor
+    power: Tensor
+
+
+@dataclass(frozen=True)
+class State:
+    """All that goes from one frame to the next; batch B.
+
+    Attributes
+    ----------
+    drive : Drive
+    step : int64 [B]
+        Frames played.
+    temperature_k : float64 [B]
+    tripped : bool [B]
+        The laser is off in the coming frame.
+    seen : Seen
+    """
+
+    drive: Drive
+    step: Tensor
+    temperature_k: Tensor
+    tripped: Tensor
+    seen: Seen
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one frame brought; batch B.
+
+    Attributes
+    ----------
+    reward : float64 [B]
+    terms : dict of float64 [B]
+        Unweighted reward terms.
+    shots : int64 [B]
+        Samples taken; 0 without laser.
+    score : DepthScore
+    cost : ShotCost
+    tripped : bool [B]
+        The laser was off.
+    truncated : bool [B]
+        The drive is over.
+    """
+
+    reward: Tensor
+    terms: dict[str, Tensor]
+    shots: Tensor
+    score: DepthScore
+    cost: ShotCost
+    tripped: Tensor
+    truncated: Tensor
+
+
+def reset(problem: Problem, seeds: Sequence[int]) -> State:
+    """Start of the drives with the given seeds, one for each environment of the batch."""
+    bank = problem.bank
+    drive = concatenate(
+        [draw_drive(s, problem.config, problem.clips, bank.height, bank.width) for s in seeds]
+    )
+    zero, none = torch.zeros(len(seeds), dtype=torch.float64), torch.zeros(len(seeds)).long()
+    return State(
+        drive=drive,
+        step=none,
+        temperature_k=drive.start_k,
+        tripped=none.bool(),
+        seen=Seen(
+            features=torch.zeros(len(seeds), len(SEEN_FEATURES)),
+            shots=none,
+            since_four=none + NEVER,
+            since_eight=none + NEVER,
+            duty=zero,
+            power=zero,
+        ),
+    )
+
+
+def step(problem: Problem, state: State, actions: Tensor) -> tuple[State, Outcome]:
+    """Play one frame of every drive.
+
+    Parameters
+    ----------
+    actions : int64 [B]
+        0 = 2 DCS, 1 = 4 DCS, 2 = 8 DCS; a laser that is off takes none.
+    """
+    shots = SHOTS_OF_ACTION[actions].masked_fill(state.tripped, 0)
+    score, features = _measure_by_shots(problem, state, shots)
+    cost = cost_of(problem, state.drive, shots)
+    terms = reward_terms(score, cost, state.drive.always_eight, state.tripped)
+    following = advance(problem, state, cost, _remember(problem, state, shots, terms, features))
+    outcome = Outcome(
+        reward=reward(terms, problem.config.reward),
+        terms=terms,
+        shots=shots,
+        score=score,
+        cost=cost,
+        tripped=state.tripped,
+        truncated=following.step >= problem.config.frames_per_drive,
+    )
+    return following, outcome
+
+
+def _measure_by_shots(problem: Problem, state: State, shots: Tensor) -> tuple[DepthScore, Tensor]:
+    """Scores and remembered features; environments with the same shots are one batch."""
+    score, features = no_depth(len(shots), problem.config.sensor.max_range_m), state.seen.features
+    for count in sorted(set(shots.tolist()) - {0}):
+        rows = (shots == count).nonzero().squeeze(1)
+        everything = len(rows) == len(shots)
+        drive = state.drive if everything else take(state.drive, rows)
+        measured = measure(problem, drive, state.step[rows], Shots(count))
+        told = keep_untold(measured.seen, features[rows], Shots(count))
+        if everything:
+            return measured.score, told
+        score, features = put(score, rows, measured.score), put(features, rows, told)
+    return score, features
+
+
+def keep_untold(new: Tensor, old: Tensor, shots: Shots) -> Tensor:
+    """Features [B, 6] of an acquisition; what its shots cannot tell stays as it was."""
+    told = {Shots.TWO: 4, Shots.FOUR: 5, Shots.EIGHT: 6}[shots]
+    return torch.cat((new[:, :told], old[:, told:]), dim=1)
+
+
+def cost_of(problem: Problem, drive: Drive, shots: Tensor) -> ShotCost:
+    """Energy, duty and heat of `shots` [B] with each drive's laser."""
+    return shot_cost(
+        shots,
+        problem.config.laser,
+        optical_power_w=drive.laser_power_w,
+        integration_s=drive.integration_s,
+        frame_period_s=problem.frame_period_s,
+        network_macs=problem.network_macs,
+    )
+
+
+def _remember(
+    problem: Problem, state: State, shots: Tensor, terms: dict[str, Tensor], features: Tensor
+) -> Seen:
+    share, seen = min(1.0, problem.frame_period_s / RECENT_S), state.seen
+    return Seen(
+        features=features,
+        shots=shots,
+        since_four=(seen.since_four + 1).masked_fill(shots >= Shots.FOUR, 0),
+        since_eight=(seen.since_eight + 1).masked_fill(shots >= Shots.EIGHT, 0),
+        duty=seen.duty + share * (terms["duty"] - seen.duty),
+        power=seen.power + share * (terms["power"] - seen.power),
+    )
+
+
+def advance(problem: Problem, state: State, cost: ShotCost, seen: Seen) -> State:
+    """The laser's heat, and the next frame."""
+    laser = problem.config.laser
+    temperature_k = thermal_step(
+        state.temperature_k, cost.heat_j, state.drive.ambient_k, laser, problem.frame_period_s
+    )
+    tripped = trip_step(state.tripped, temperature_k, laser)
+    return State(state.drive, state.step + 1, temperature_k, tripped, seen)
+
+
+def observe(problem: Problem, state: State) -> Tensor:
+    """Features float32 [B, len(FEATURES)] in [-LIMIT, LIMIT], in the order of `FEATURES`."""
+    drive, seen, laser = state.drive, state.seen, problem.config.laser
+    now, before = drive.frame(state.step), drive.frame((state.step - 1).clamp(min=0))
+    limit_k = torch.where(state.tripped, laser.release_k, laser.trip_k)
+    columns = (
+        gray_change(problem.scenes, before, now),
+        seen.shots == Shots.TWO,
+        seen.shots == Shots.FOUR,
+        seen.shots == Shots.EIGHT,
+        1.0 - torch.exp(seen.since_four / -16.0),
+        1.0 - torch.exp(seen.since_eight / -16.0),
+        (state.temperature_k - laser.release_k) / 20.0,
+        (limit_k - state.temperature_k) / 20.0,
+        seen.duty,
+        seen.power,
+        1.0 - state.step * (2.0 / problem.config.frames_per_drive),
+    )
+    current = torch.stack([column.to(torch.float32) for column in columns], dim=1)
+    features = torch.cat((problem.scenes.features[now], seen.features, current), dim=1)
+    assert features.shape[1] == len(FEATURES)
+    return features.clamp_(-LIMIT, LIMIT)
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """What each action would bring in each frame of one drive, with a working laser.
+
+    Attributes
+    ----------
+    terms : dict of float64 [T, 3]
+        Unweighted reward terms; "tripped" is 0.
+    reward : float64 [T, 3]
+    heat_j : float64 [T, 3]
+    score : DepthScore
+        Fields [T, 3].
+    features : float32 [T, 3, 6]
+        What the sensor would tell.
+    tripped_terms : dict of float64
+        Terms of a frame without laser, the same in every frame.
+    """
+
+    terms: dict[str, Tensor]
+    reward: Tensor
+    heat_j: Tensor
+    score: DepthScore
+    features: Tensor
+    tripped_terms: dict[str, Tensor]
+    tripped_reward: float
+
+
+def outcomes_of_all_actions(problem: Problem, drive: Drive) -> Outcomes:
+    """Play every action in every frame of `drive` (a batch of one), without its consequences."""
+    steps = torch.arange(problem.config.frames_per_drive)
+    measured = [_measure_all(problem, drive, step.unsqueeze(0)) for step in steps]
+    score = _stack([m.score for m in measured], len(steps))
+    features = torch.cat([m.seen for m in measured]).unflatten(0, (len(steps), 3))
+    cost = cost_of(problem, drive, SHOTS_OF_ACTION)
+    working = torch.zeros(len(steps), 3, dtype=torch.bool)
+    terms = reward_terms(score, cost, drive.always_eight, working)
+    off = cost_of(problem, drive, torch.zeros(1, dtype=torch.int64))
+    lost = no_depth(1, problem.config.sensor.max_range_m)
+    tripped_terms = reward_terms(lost, off, drive.always_eight, torch.ones(1, dtype=torch.bool))
+    everywhere = {name: value.expand(len(steps), 3) for name, value in terms.items()}
+    return Outcomes(
+        terms=everywhere,
+        reward=reward(everywhere, problem.config.reward),
+        heat_j=cost.heat_j.expand(len(steps), 3),
+        score=score,
+        features=features,
+        tripped_terms=tripped_terms,
+        tripped_reward=float(reward(tripped_terms, problem.config.reward)),
+    )
+
+
+def _measure_all(problem: Problem, drive: Drive, step: Tensor) -> Measured:
+    """All three acquisitions of one frame; they share the noise of the longest."""
+    noise = noise_of(drive, step, Shots.EIGHT, problem.bank.height, problem.bank.width)
+    return concatenate([measure(problem, drive, step, shots, noise) for shots in Shots])
+
+
+def _stack(scores: Sequence[DepthScore], frames: int) -> DepthScore:
+    joined = concatenate(scores)
+    fields = [field.name for field in dataclasses.fields(joined)]
+    return DepthScore(*(getattr(joined, name).unflatten(0, (frames, 3)) for name in fields))

@@ -1,0 +1,153 @@
+"""One acquisition of the drive's current frames: light -> raw -> depth -> score and features."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from shotenv.drive import Drive
+from shotenv.problem import Problem
+from shotenv.reward import DepthScore, frame_sum, score_depth
+from shotenv.sensor import (
+    Electrons,
+    acquire,
+    collect,
+    draw_noise,
+    sample_noise_lsb,
+    single_sample_snr,
+)
+from unwrap.acquisition import Shots
+from unwrap.correction import Prediction, correct
+from unwrap.frames import DepthFrame, RawFrame
+from unwrap.phase import unambiguous_range_m
+
+
+@dataclass(frozen=True)
+class Acquisition:
+    """What one acquisition made of a batch of frames, and the truth beside it.
+
+    Attributes
+    ----------
+    raw, depth : RawFrame, DepthFrame
+        Samples and corrected depth.
+    prediction_m, noise_lsb, truth_m : float32 [B, H, W]
+        The network's coarse distance, the sensor's own estimate of a sample's noise, the truth.
+    scored : bool [B, H, W]
+        Pixels that count.
+    """
+
+    raw: RawFrame
+    depth: DepthFrame
+    prediction_m: Tensor
+    noise_lsb: Tensor
+    truth_m: Tensor
+    scored: Tensor
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What is known after an acquisition.
+
+    Attributes
+    ----------
+    score : DepthScore
+        Against the truth; pays the reward.
+    seen : float32 [B, 6]
+        What the sensor itself can tell, see `observe.SEEN_FEATURES`; the last two columns are
+        meaningful only with enough shots.
+    """
+
+    score: DepthScore
+    seen: Tensor
+
+
+def noise_of(drive: Drive, step: Tensor, shots: Shots, height: int, width: int) -> Tensor:
+    """Normals [B, n, 2, H, W] of the frames at `step` [B]; each drive has its own stream."""
+    keys = zip(drive.seed.tolist(), step.tolist(), strict=True)
+    drawn = [draw_noise(seed, frame, shots, height, width) for seed, frame in keys]
+    return drawn[0].unsqueeze(0) if len(drawn) == 1 else torch.stack(drawn)
+
+
+def acquire_depth(
+    problem: Problem, drive: Drive, step: Tensor, shots: Shots, noise: Tensor | None = None
+) -> Acquisition:
+    """Acquire and correct the frames at `step` [B] of `drive` with `shots` samples each.
+
+    `noise` [B, n, 2, H, W], n >= shots, is drawn from the drive's own stream where it is None.
+    """
+    bank, sensor, frames = problem.bank, problem.config.sensor, drive.frame(step)
+    if noise is None:
+        noise = noise_of(drive, step, shots, bank.height, bank.width)
+    exposure = bank.exposure(frames)
+    electrons = collect(exposure, sensor, drive.laser_power_w, drive.integration_s)
+    raw = acquire(electrons, sensor, shots=shots, noise=noise, offsets=drive.offsets)
+    prediction_m = problem.kept.distance_of(frames)
+    noise_lsb = sample_noise_lsb(
+        bank.gray(frames), problem.gray_exposure_s[frames], drive.integration_s, sensor
+    )
+    depth = correct(
+        raw,
+        Prediction(prediction_m, prediction_m),
+        problem.description,
+        merge=problem.config.merge,
+        # Four samples of a frequency cancel the offset by themselves.
+        offset_lsb=drive.offsets.calibrated_lsb if shots == Shots.TWO else None,
+        noise_lsb=noise_lsb,
+    )
+    scored = scored_pixels(electrons, exposure.distance_m, problem)
+    return Acquisition(raw, depth, prediction_m, noise_lsb, exposure.distance_m, scored)
+
+
+def scored_pixels(electrons: Electrons, truth_m: Tensor, problem: Problem) -> Tensor:
+    """Pixels that count: truth within the range, single-sample signal to noise large enough."""
+    sensor = problem.config.sensor
+    strong = single_sample_snr(electrons, sensor) > sensor.min_snr
+    return strong.logical_and_(truth_m <= sensor.max_range_m)
+
+
+def measure(
+    problem: Problem, drive: Drive, step: Tensor, shots: Shots, noise: Tensor | None = None
+) -> Measured:
+    """Acquire, correct and score the frames at `step` [B] of `drive`."""
+    made = acquire_depth(problem, drive, step, shots, noise)
+    score = score_depth(
+        made.depth.distance_m,
+        made.depth.valid,
+        made.truth_m,
+        made.scored,
+        error_scale_m=problem.config.reward.error_scale_m,
+        unambiguous_m=unambiguous_range_m(problem.config.sensor.f1_hz),
+        range_m=problem.config.sensor.max_range_m,
+    )
+    return Measured(score, seen_by_sensor(made, shots))
+
+
+def seen_by_sensor(made: Acquisition, shots: Shots) -> Tensor:
+    """What the sensor can tell of an acquisition without the truth, float32 [B, 6]."""
+    four_sigma = 4.0 * made.noise_lsb
+    amplitude, residual = made.depth.amplitude, made.depth.residual
+    pixels = amplitude.shape[1] * amplitude.shape[2]
+    nothing = torch.zeros(len(amplitude), dtype=torch.float64)
+    valid = made.depth.valid.to(amplitude.dtype)
+    valid_count = frame_sum(valid)
+    disagreement = nothing
+    if shots == Shots.EIGHT:
+        apart_m = (made.depth.distance_m - made.prediction_m).abs_()
+        apart = frame_sum(_bounded(apart_m, torch.ones_like(apart_m)) * valid)
+        disagreement = apart / valid_count.clamp(min=1)
+    columns = (
+        (frame_sum(amplitude) / pixels).log1p() / 6.9,
+        frame_sum(_bounded(amplitude, four_sigma)) / pixels,
+        valid_count / pixels,
+        frame_sum(made.raw.saturated.to(amplitude.dtype)) / pixels,
+        nothing if residual is None else frame_sum(_bounded(residual, four_sigma)) / pixels,
+        disagreement,
+    )
+    return torch.stack(columns, dim=1).to(torch.float32)
+
+
+def _bounded(value: Tensor, scale: Tensor) -> Tensor:
+    """value / (value + scale), 0..1."""
+    return value / (value + scale)

@@ -1,0 +1,117 @@
+"""What never changes while drives are played: bank, predictions, configuration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import torch
+from torch import Tensor
+
+from shotenv.bank import Bank, Clip, open_bank
+from shotenv.config import EnvConfig, SensorConfig
+from shotenv.observe import Scenes, look_at_scenes
+from shotenv.predictions import KeptPredictions, keep_predictions
+from unwrap.correction import SensorDescription
+from unwrap.unwrapper import load_unwrapper
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Parameters of the decision problem; `open_problem` makes one from a configuration.
+
+    Attributes
+    ----------
+    config : EnvConfig
+    bank : Bank
+    clips : tuple of Clip
+        Those of the chosen split.
+    kept : KeptPredictions
+        The network's predictions for the bank's frames.
+    scenes : Scenes
+        What is seen of each frame before any sample is taken.
+    gray_exposure_s : float64 [N]
+        Exposure time of each frame's gray image.
+    network_macs : int
+        Multiply-accumulates of one prediction.
+    description : SensorDescription
+        What the correction must know of the sensor.
+    """
+
+    config: EnvConfig
+    bank: Bank
+    clips: tuple[Clip, ...]
+    kept: KeptPredictions
+    scenes: Scenes
+    gray_exposure_s: Tensor
+    network_macs: int
+    description: SensorDescription
+
+    def __reduce__(self):
+        return (open_problem, (self.config,))
+
+    @property
+    def frame_period_s(self) -> float:
+        """Seconds from frame to frame."""
+        return 1.0 / self.config.frame_rate_hz
+
+
+@lru_cache(maxsize=4)
+def open_problem(config: EnvConfig) -> Problem:
+    """Open bank and network of `config`; environments of one process share the result.
+
+    Raises
+    ------
+    ValueError
+        The bank or the network is missing or damaged, or the bank was rendered for a sensor with
+        other frequencies or timing.
+    """
+    bank = open_bank(config.bank)
+    check_fits(bank, config.sensor)
+    clips = bank.splits(config.split)
+    unwrapper = load_unwrapper(config.unwrapper)
+    kept = keep_predictions(bank, unwrapper)
+    return Problem(
+        config=config,
+        bank=bank,
+        clips=clips,
+        kept=kept,
+        scenes=look_at_scenes(bank, clips, kept, config.sensor),
+        gray_exposure_s=torch.from_numpy(bank.gray_exposure_s),
+        network_macs=unwrapper.macs(bank.height, bank.width),
+        description=describe(config.sensor),
+    )
+
+
+RENDERED_WITH = ("f1_hz", "f2_hz", "sample_period_s", "wavelength_nm")
+"""Sensor fields that are part of the rendered light and cannot be changed afterwards."""
+
+
+def check_fits(bank: Bank, sensor: SensorConfig) -> None:
+    """Refuse a sensor whose frequencies or timing are not those the bank was rendered with.
+
+    Raises
+    ------
+    ValueError
+        Names the field, both values and the cure.
+    """
+    if bank.config is None:
+        return
+    for field in RENDERED_WITH:
+        rendered, wanted = getattr(bank.config.sensor, field), getattr(sensor, field)
+        if rendered != wanted:
+            raise ValueError(
+                f"sensor.{field} is {wanted:g}, but bank {bank.config.name} was rendered with "
+                f"{rendered:g}; render a bank with this sensor"
+            )
+
+
+def describe(sensor: SensorConfig) -> SensorDescription:
+    """What the correction must know of `sensor`."""
+    return SensorDescription(
+        f1_hz=sensor.f1_hz,
+        f2_hz=sensor.f2_hz,
+        max_range_m=sensor.max_range_m,
+        saturation_range_m=sensor.saturation_range_m,
+        min_snr=sensor.min_snr,
+    )
