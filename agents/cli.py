@@ -1,0 +1,194 @@
+"""The command line: `shotenv COMMAND`. Arguments and errors here, the work in `agents.commands`.
+
+Exit status: 0 done; 1 what was asked for failed, with one sentence on stderr; 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+
+from jsonargparse import ArgumentError, ArgumentParser, Namespace
+
+from shotenv.config import (
+    BankConfig,
+    ConfigError,
+    DemoConfig,
+    Section,
+    configs_dir,
+    one_sentence,
+)
+
+DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
+
+
+@dataclass(frozen=True)
+class Command:
+    """One command: its words, what it does, and its arguments."""
+
+    words: str
+    help: str
+    arguments: Callable[[ArgumentParser], None]
+
+    @property
+    def function(self) -> Callable[[Namespace], int]:
+        """What does the work, in `agents.commands`."""
+        return getattr(import_module("agents.commands"), self.words.replace(" ", "_"))
+
+    def parser(self) -> ArgumentParser:
+        """Parser of the command's own arguments."""
+        parser = ArgumentParser(
+            prog=f"shotenv {self.words}", description=self.help, exit_on_error=False
+        )
+        self.arguments(parser)
+        return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    try:
+        return _run(words)
+    except SystemExit as leaving:  # argparse, after --help or --print_config
+        return DONE if leaving.code in (None, 0) else WRONG_USAGE
+    except (ArgumentError, ConfigError) as error:
+        return _refuse(one_sentence(error), WRONG_USAGE)
+    except KeyboardInterrupt:
+        return _refuse("interrupted; the same command continues where it stopped", INTERRUPTED)
+    except BrokenPipeError:
+        # Whoever read the output has left; Python would complain once more while closing it.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+    except ImportError as error:
+        return _refuse(f"{error}; `shotenv doctor` tells what is missing", FAILED)
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        return _refuse(f"{where}{error.strerror or error}", FAILED)
+    except (ValueError, RuntimeError) as error:
+        return _refuse(one_sentence(error), FAILED)
+
+
+def _refuse(sentence: str, status: int) -> int:
+    print(f"shotenv: {sentence}", file=sys.stderr)
+    return status
+
+
+def _run(words: list[str]) -> int:
+    if words == ["--version"]:
+        print(version("shotenv"))
+        return DONE
+    for command in COMMANDS:
+        own = command.words.split()
+        if words[: len(own)] == own:
+            parser = command.parser()
+            arguments = parser.instantiate(parser.parse_args(words[len(own) :]))
+            return command.function(arguments)
+    return _overview(words)
+
+
+def _overview(words: list[str]) -> int:
+    """List the commands, or those that begin with the words given."""
+    asked = [word for word in words if word not in HELP]
+    matching = [c for c in COMMANDS if c.words.split()[: len(asked)] == asked]
+    if not matching:
+        known = ", ".join(command.words for command in COMMANDS)
+        raise ConfigError(f"command is {' '.join(asked)!r}; expected one of {known}")
+    stream = sys.stderr if asked == words else sys.stdout
+    print("usage: shotenv COMMAND [--help] [arguments]\n", file=stream)
+    for command in matching:
+        print(f"  {command.words:18}{command.help}", file=stream)
+    return WRONG_USAGE if asked == words else DONE
+
+
+def _experiment(parser: ArgumentParser) -> None:
+    """Environment, agent and drives, from `configs/demo.yaml` unless told otherwise."""
+    _config(parser, DemoConfig, "demo.yaml")
+    _json(parser)
+
+
+def _config(parser: ArgumentParser, section: type[Section], default: str) -> None:
+    parser.default_config_files = [str(configs_dir() / default)]
+    parser.add_argument("--config", action="config", help="YAML file over the defaults")
+    parser.add_class_arguments(section, None, sub_configs=True)
+
+
+def _json(parser: ArgumentParser) -> None:
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers to FILE")
+
+
+def _out(parser: ArgumentParser, default: str, what: str) -> None:
+    parser.add_argument("--out", type=Path, default=Path(default), metavar="DIR", help=what)
+
+
+def _doctor(parser: ArgumentParser) -> None:
+    _json(parser)
+
+
+def _demo(parser: ArgumentParser) -> None:
+    _experiment(parser)
+    _out(parser, "runs/demo", "folder of the results and the report")
+
+
+def _render(parser: ArgumentParser) -> None:
+    _config(parser, BankConfig, "bank/starter.yaml")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the bank")
+    parser.add_argument("--workers", type=int, metavar="N", help="processes; one per core")
+
+
+def _bank(parser: ArgumentParser) -> None:
+    parser.add_argument("bank", help="name or path of a bank")
+    _json(parser)
+
+
+def _unwrap_train(parser: ArgumentParser) -> None:
+    from unwrap.train import TrainConfig
+
+    parser.add_argument("--config", action="config", help="YAML file over the defaults")
+    parser.add_class_arguments(TrainConfig, None, sub_configs=True)
+    _out(parser, "runs/unwrap", "folder of the weights and the checkpoint")
+
+
+def _unwrap_evaluate(parser: ArgumentParser) -> None:
+    parser.add_argument("unwrapper", help="name or path of a network")
+    parser.add_argument("--bank", default="starter", help="name or path of a bank")
+    parser.add_argument("--split", default="test", help="train, validation, test or all")
+    _json(parser)
+
+
+def _train(parser: ArgumentParser) -> None:
+    _experiment(parser)
+    _out(parser, "runs/agent", "folder of the scheduler and its checkpoint")
+
+
+def _evaluate(parser: ArgumentParser) -> None:
+    parser.add_argument("scheduler", type=Path, help="folder of a trained scheduler")
+    _experiment(parser)
+    _out(parser, "runs/evaluation", "folder of the results and the report")
+
+
+def _report(parser: ArgumentParser) -> None:
+    parser.add_argument("results", type=Path, help="folder that an evaluation wrote")
+
+
+HELP = ("--help", "-h", "help")
+COMMANDS = (
+    Command("doctor", "say what is installed, what is missing and what mends it", _doctor),
+    Command("demo", "render, train a scheduler, compare it with baselines, write a report", _demo),
+    Command("render", "render a bank of worlds; continues where it stopped", _render),
+    Command("bank info", "tell what is in a bank", _bank),
+    Command("bank verify", "check every file of a bank against its checksum", _bank),
+    Command("unwrap train", "train an unwrapping network on a rendered bank", _unwrap_train),
+    Command("unwrap evaluate", "measure an unwrapping network on a bank", _unwrap_evaluate),
+    Command("train", "train a scheduler with PPO; continues where it stopped", _train),
+    Command("evaluate", "compare a trained scheduler with baselines, write a report", _evaluate),
+    Command("report", "write the report of an evaluation anew", _report),
+    Command("problem", "measure how much there is to win in the decision problem", _experiment),
+)
+
+if __name__ == "__main__":
+    sys.exit(main())
