@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from shotenv.world import materials as m
@@ -121,7 +123,7 @@ def tunnel_tube(
     section: list[tuple[float, float]], x: tuple[float, float], lining: Material
 ) -> Mesh:
     """The inner face of a tunnel over a stretch of x."""
-    strips = zip(section[:-1], section[1:], strict=True)
+    strips = pairwise(section)
     return meshes.join(
         meshes.polygon([(x[0], *a), (x[1], *a), (x[1], *b), (x[0], *b)], lining) for a, b in strips
     )

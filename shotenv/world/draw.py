@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,11 +22,12 @@ STANDING_SHARE = 0.2
 
 @dataclass(frozen=True)
 class Place:
-    """A kind of place: how it is laid out, how fast it is driven, how often it is drawn."""
+    """A kind of place: its layout, how fast and how straight it is driven, how often drawn."""
 
     lay_out: Callable[[Site, np.random.Generator], None]
     speed_m_s: Range
     share: float
+    yaw_std_rad: float
 
 
 def _garage(site: Site, rng: np.random.Generator) -> None:
@@ -43,17 +44,17 @@ def _daylight(rng: np.random.Generator) -> Light:
 
 def _open_places(country: float, town: float, park: float) -> tuple[Place, ...]:
     return (
-        Place(roads.country_road, (2.0, 15.0), country),
-        Place(roads.town_street, (0.5, 10.0), town),
-        Place(roads.car_park, (0.0, 1.2), park),
+        Place(roads.country_road, (2.0, 15.0), country, 0.02),
+        Place(roads.town_street, (0.5, 10.0), town, 0.02),
+        Place(roads.car_park, (0.0, 1.2), park, 0.15),
     )
 
 
 PLACES: dict[Family, tuple[Place, ...]] = {
     "sunny_road": _open_places(0.50, 0.25, 0.25),
     "overcast_street": _open_places(0.10, 0.60, 0.30),
-    "garage": (Place(_garage, (0.0, 3.0), 1.0),),
-    "tunnel": (Place(_tunnel, (2.0, 15.0), 1.0),),
+    "garage": (Place(_garage, (0.0, 3.0), 1.0, 0.1),),
+    "tunnel": (Place(_tunnel, (2.0, 15.0), 1.0, 0.02),),
     "night_road": _open_places(0.40, 0.35, 0.25),
 }
 LIGHTS: dict[Family, Callable[[np.random.Generator], Light]] = {
@@ -93,7 +94,8 @@ def draw_world(family: Family, seed: int, config: WorldConfig) -> World:
     place = places[rng.choice(len(places), p=[place.share for place in places])]
     light = LIGHTS[family](rng)
     duration_s = config.frames_per_clip / config.frame_rate_hz
-    ego = draw_ego(rng, ego_speed(rng, place.speed_m_s, duration_s, config), duration_s)
+    speed = ego_speed(rng, place.speed_m_s, duration_s, config)
+    ego = draw_ego(rng, speed, duration_s, place.yaw_std_rad)
     site = Site(ego, duration_s, night=family == "night_road")
     place.lay_out(site, rng)
     return site.world(family, seed, light)
@@ -113,18 +115,27 @@ def ego_speed(
     if low * duration_s > LONGEST_DRIVE_M:
         raise ValueError(
             f"speed_m_s is ({low:g}, {high:g}); expected at most {LONGEST_DRIVE_M / duration_s:g} "
-            f"m/s at its low end, for a clip of {duration_s:g} s in a world {LONGEST_DRIVE_M:g} m long"
+            f"m/s at its low end, for a clip of {duration_s:g} s in a world of {LONGEST_DRIVE_M:g} m"
         )
     wish = 0.0 if rng.random() < STANDING_SHARE else rng.uniform(*usual)
     return float(np.clip(wish, low, min(high, LONGEST_DRIVE_M / duration_s)))
 
 
-def draw_ego(rng: np.random.Generator, speed_m_s: float, duration_s: float) -> Motion:
+def draw_ego(
+    rng: np.random.Generator, speed_m_s: float, duration_s: float, yaw_std_rad: float
+) -> Motion:
     """Path of the camera: a height, a slight pitch, and a bend too slight to leave the lane."""
-    height = rng.uniform(*CAMERA_HEIGHT_M)
-    # On a shallow arc the lateral shift is about yaw rate * speed * t^2 / 2.
-    sharpest = 2 * WIDEST_SWERVE_M / max(speed_m_s * duration_s**2, 1e-9)
-    rate = float(np.clip(rng.normal(0.0, 0.03), -min(sharpest, 0.08), min(sharpest, 0.08)))
-    moving = speed_m_s > 0
-    start = Pose((0.0, 0.0, float(height)), 0.0, float(rng.uniform(-0.03, 0.03)))
-    return Motion(start, speed_m_s, rate if moving else 0.0)
+    height, pitch = float(rng.uniform(*CAMERA_HEIGHT_M)), float(rng.uniform(-0.03, 0.03))
+    yaw, rate = _swerve(rng.normal(0.0, (yaw_std_rad, 0.04)), speed_m_s * duration_s, duration_s)
+    return Motion(Pose((0.0, 0.0, height), yaw, pitch), speed_m_s, rate if speed_m_s > 0 else 0.0)
+
+
+def _swerve(wish: np.ndarray, travel_m: float, duration_s: float) -> tuple[float, float]:
+    """Yaw and yaw rate, kept so small that the path shifts sideways by a few decimetres."""
+    # On a shallow arc the shift is travel * (yaw + rate * duration / 2).
+    most = min(WIDEST_SWERVE_M / max(travel_m, 1e-9) / 2, 0.3)
+    yaw, rate = (
+        np.clip(wish, -most, most)[0],
+        np.clip(wish[1], -2 * most / duration_s, 2 * most / duration_s),
+    )
+    return float(yaw), float(np.clip(rate, -0.1, 0.1))

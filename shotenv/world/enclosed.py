@@ -9,7 +9,7 @@ from shotenv.world import materials as m
 from shotenv.world.model import Indoor, Lamp, Motion, Pose
 from shotenv.world.roads import BEHIND_M, PAINT_M, REACH_M
 from shotenv.world.site import Site
-from shotenv.world.traffic import approaching_car, crossing, lead, pavement_thing, row, walkers
+from shotenv.world.traffic import approaching_car, crossing, lead, row, walkers
 
 TUBE_LAMP_M = 1.4
 TUBE_WIDTH_M = 0.12
@@ -28,21 +28,20 @@ def garage(site: Site, rng: np.random.Generator, irradiance: m.Range) -> None:
     """
     height, aisle, depth = rng.uniform(2.25, 2.9), rng.uniform(5.5, 7.0), rng.uniform(4.8, 5.2)
     near = rng.random() < 0.4
-    end = site.travel_m + (rng.uniform(1.6, 6.0) if near else rng.uniform(8.0, 28.0))
+    end = site.travel_m + (rng.uniform(0.9, 6.0) if near else rng.uniform(8.0, 28.0))
     half = aisle / 2 + depth
     shell(site, rng, end, half, height)
+    site.enclose((-10.0, end - 0.05), (-half + 0.05, half - 0.05))
     bay_lines(site, rng, end, aisle, depth)
     bay = rng.uniform(2.5, 2.8)
     for side in (-1, 1):
         pillars(site, rng, end, side * (aisle / 2 + 0.5), 2 * bay, height)
         parked(site, rng, end, side * (aisle / 2 + depth / 2 + 0.2), bay, side)
     if near and rng.random() < 0.5:
-        site.put(
-            vehicles.car(rng), end - rng.uniform(0.0, 0.3) - 1.0, rng.uniform(-0.5, 0.5), np.pi / 2
-        )
+        site.put(vehicles.car(rng), end - 1.2, rng.uniform(-0.5, 0.5), np.pi / 2)
     ceiling_lamps(site, rng, (-6.0, end), height, irradiance, (-aisle / 4, aisle / 4))
     crossing(site, rng, (-aisle / 2, aisle / 2), near=0.8)
-    walkers(site, rng, rng.integers(0, 3), (-aisle / 2 + 0.3, aisle / 2 - 0.3))
+    walkers(site, rng, rng.integers(1, 3), (-aisle / 2 + 0.3, aisle / 2 - 0.3))
     if rng.random() < 0.35:
         x = rng.uniform(8.0, 20.0) + site.travel_m
         approaching_car(site, rng, Motion(Pose((x, aisle / 4, 0.0), np.pi), rng.uniform(0.5, 3.0)))
@@ -93,10 +92,10 @@ def end_wall(
     site.put(meshes.box((0.3, 2 * half, parapet), wall), end + 0.15, 0.0)
     site.build(meshes.box((0.3, 2 * half, lintel), wall, (end + 0.15, 0.0, height - lintel)))
     site.build(
-        meshes.patch((end + 0.3, end + REACH_M), (-REACH_M, REACH_M), -0.05, m.GRASS.draw(rng))
+        meshes.patch((end + 0.3, end + REACH_M), (-REACH_M, REACH_M), 0.0, m.GRASS.draw(rng))
     )
     for y in rng.uniform(-8.0, 8.0, rng.integers(1, 4)):
-        site.put(furniture.tree(rng), end + rng.uniform(3.0, 12.0), y, 0.0, -0.05)
+        site.put(furniture.tree(rng), end + rng.uniform(3.0, 12.0), y)
 
 
 def bay_lines(site: Site, rng: np.random.Generator, end: float, aisle: float, depth: float) -> None:
@@ -244,11 +243,11 @@ def outside(
     far, verge = site.travel_m + REACH_M, m.GRASS.draw(rng)
     edges = (centre - half - 0.3, centre + half + 0.3)
     for y in ((-REACH_M, edges[0]), (edges[1], REACH_M)):
-        site.build(meshes.patch((exit_x, far), y, -0.02, verge))
+        site.build(meshes.patch((exit_x, far), y, 0.0, verge))
     for side, edge in ((-1, edges[0]), (1, edges[1])):
         if rng.random() < 0.5:
             rail = furniture.guard_rail(rng, 16.0)
-            site.put(rail, exit_x + 9.0, edge + 0.5 * side, -side * np.pi / 2, -0.02)
+            site.put(rail, exit_x + 9.0, edge + 0.5 * side, -side * np.pi / 2)
         for x in np.arange(exit_x + 2.0, exit_x + 26.0, 5.0):
             thing = furniture.tree(rng) if rng.random() < 0.7 else furniture.sign(rng)
-            site.put(thing, x, edge + side * rng.uniform(1.6, 6.0), np.pi, -0.02)
+            site.put(thing, x, edge + side * rng.uniform(1.6, 6.0), np.pi)

@@ -38,7 +38,7 @@ def direction(azimuth_rad: float, elevation_rad: float) -> tuple[float, float, f
 
 
 def sunny(rng: np.random.Generator) -> Light:
-    """Sun at 15 to 60 degrees through more or less haze, and a blue sky, brighter at the horizon."""
+    """Sun at 15 to 60 degrees, more or less haze, and a blue sky, brighter at the horizon."""
     elevation, haze = np.radians(rng.uniform(15.0, 60.0)), rng.uniform(0.0, 0.35)
     zenith = rng.uniform(0.3, 0.45)
     return Light(

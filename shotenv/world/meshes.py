@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import fields, replace
+from functools import cache
 
 import numpy as np
 import trimesh
@@ -107,9 +108,8 @@ def back(y: tuple[float, float], z: tuple[float, float], x: float, material: Mat
 
 def box(size: Point, material: Material, base: Point = ORIGIN) -> Mesh:
     """A box of `size` whose lowest face is centred on `base`."""
-    x, y, z = base
-    solid = trimesh.creation.box(extents=size)
-    return soup(np.asarray(solid.triangles) + (x, y, z + size[2] / 2), material)
+    centre = np.array(base) + np.array([0.0, 0.0, size[2] / 2])
+    return soup(_unit_box() * np.array(size) + centre, material)
 
 
 def rod(
@@ -120,8 +120,13 @@ def rod(
     sections: int = 8,
 ) -> Mesh:
     """A capped cylinder between two points."""
-    solid = trimesh.creation.cylinder(radius=radius, segment=[start, end], sections=sections)
-    return soup(np.asarray(solid.triangles), material)
+    axis = np.subtract(end, start)
+    length = np.linalg.norm(axis)
+    side = np.cross(axis / length, np.eye(3)[np.abs(axis).argmin()])
+    side *= radius / np.linalg.norm(side)
+    across = np.cross(axis / length, side)
+    frame = np.stack([side, across, axis])
+    return soup(_unit_cylinder(sections) @ frame + np.asarray(start), material)
 
 
 def lathe(
@@ -132,23 +137,43 @@ def lathe(
 ) -> Mesh:
     """A solid of revolution about z; `profile` is (radius, height) from bottom to top."""
     solid = trimesh.creation.revolve(np.asarray(profile, dtype=np.float64), sections=sections)
-    return soup(np.asarray(solid.triangles) + np.asarray(base), material)
+    triangles = np.asarray(solid.triangles) + np.asarray(base)
+    # Where the profile meets the axis, half of each quadrilateral has no area.
+    edges = triangles[:, 1:] - triangles[:, :1]
+    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    return soup(triangles[area > 1e-9], material)
 
 
 def ball(radius: float, material: Material, centre: Point, detail: int = 1) -> Mesh:
     """An icosphere; `detail` 0 has 20 faces, 1 has 80."""
-    solid = trimesh.creation.icosphere(subdivisions=detail, radius=radius)
-    return soup(np.asarray(solid.triangles) + np.asarray(centre), material)
+    vertices, faces = _unit_icosphere(detail)
+    return soup(vertices[faces] * radius + np.asarray(centre), material)
 
 
 def blob(
     rng: np.random.Generator, radius: float, material: Material, centre: Point, detail: int = 1
 ) -> Mesh:
     """A lumpy ball: each vertex of an icosphere pushed in or out."""
-    solid = trimesh.creation.icosphere(subdivisions=detail, radius=radius)
-    lumps = rng.uniform(0.7, 1.25, size=(len(solid.vertices), 1))
-    vertices = np.asarray(solid.vertices) * lumps + np.asarray(centre)
-    return soup(vertices[np.asarray(solid.faces)], material)
+    vertices, faces = _unit_icosphere(detail)
+    lumps = radius * rng.uniform(0.7, 1.25, size=(len(vertices), 1))
+    return soup((vertices * lumps)[faces] + np.asarray(centre), material)
+
+
+@cache
+def _unit_box() -> np.ndarray:
+    return np.array(trimesh.creation.box(extents=(1.0, 1.0, 1.0)).triangles)
+
+
+@cache
+def _unit_cylinder(sections: int) -> np.ndarray:
+    solid = trimesh.creation.cylinder(radius=1.0, height=1.0, sections=sections)
+    return np.array(solid.triangles) + np.array([0.0, 0.0, 0.5])
+
+
+@cache
+def _unit_icosphere(detail: int) -> tuple[np.ndarray, np.ndarray]:
+    solid = trimesh.creation.icosphere(subdivisions=detail, radius=1.0)
+    return np.array(solid.vertices), np.array(solid.faces)
 
 
 def extrude(profile: Sequence[tuple[float, float]], width: float, material: Material) -> Mesh:

@@ -9,6 +9,8 @@ from shotenv.world import meshes
 from shotenv.world.materials import Material
 from shotenv.world.model import Mesh
 
+HAIR_PROFILE = [(0.1, 0.0), (0.11, 0.04), (0.085, 0.11), (0.0, 0.135)]
+
 
 def clothes(rng: np.random.Generator) -> Material:
     """One garment, more often bright than dark in the near infrared."""
@@ -41,8 +43,8 @@ def legs(rng: np.random.Generator, stride_m: float) -> Mesh:
         foot = side * stride_m / 2
         knee, y = foot / 2 + 0.03, side * 0.10
         parts += [
-            meshes.rod((knee, y, 0.44), (0.0, y, 0.86), 0.085, trousers),
-            meshes.rod((foot, y, 0.06), (knee, y, 0.47), 0.065, trousers),
+            meshes.rod((knee, y, 0.44), (0.0, y, 0.86), 0.085, trousers, sections=6),
+            meshes.rod((foot, y, 0.06), (knee, y, 0.47), 0.065, trousers, sections=6),
             meshes.box((0.26, 0.10, 0.08), shoe, (foot + 0.05, y, 0.0)),
         ]
     return meshes.join(parts)
@@ -78,8 +80,8 @@ def arms(rng: np.random.Generator, stride_m: float) -> Mesh:
             (swing + 0.04, y + side * 0.03, 0.86),
         )
         parts += [
-            meshes.rod((0.0, y - side * 0.03, 1.42), elbow, 0.052, sleeve, sections=6),
-            meshes.rod(elbow, hand, 0.043, sleeve, sections=6),
+            meshes.rod((0.0, y - side * 0.03, 1.42), elbow, 0.052, sleeve, sections=5),
+            meshes.rod(elbow, hand, 0.043, sleeve, sections=5),
             meshes.ball(0.055, skin, hand, detail=0),
         ]
     return meshes.join(parts)
@@ -91,9 +93,9 @@ def head(rng: np.random.Generator, centre: meshes.Point) -> Mesh:
     skin = m.SKIN.draw(rng)
     return meshes.join(
         [
-            meshes.ball(0.105, skin, centre),
+            meshes.lathe([(0.0, -0.13), (0.075, -0.11), (0.1, 0.0), (0.07, 0.1)], skin, centre),
             meshes.rod((x - 0.03, y, z - 0.2), (x - 0.01, y, z - 0.05), 0.055, skin, sections=6),
-            meshes.ball(0.11, m.HAIR.draw(rng), (x - 0.025, y, z + 0.03), detail=1),
+            meshes.lathe(HAIR_PROFILE, m.HAIR.draw(rng), (x - 0.02, y, z)),
         ]
     )
 

@@ -33,35 +33,31 @@ def country_road(site: Site, rng: np.random.Generator) -> None:
     carriageway(site, rng, right, left, lane)
     verge = (m.GRASS if rng.random() < 0.7 else m.SOIL).draw(rng)
     for y in ((-REACH_M, right), (left, REACH_M)):
-        site.build(meshes.patch((-BEHIND_M, far), y, -0.02, verge))
+        site.build(meshes.patch((-BEHIND_M, far), y, 0.0, verge))
     oncoming(site, rng, lane)
     lead(site, rng)
     walkers(site, rng, count=rng.integers(0, 3), y=(right - 1.5, right - 0.6))
-    cyclists(site, rng, right + 0.5)
+    cyclists(site, rng, right + 0.35)
     if rng.random() < 0.4:
         rail = furniture.guard_rail if rng.random() < 0.6 else furniture.jersey_barrier
         y, length = right - 0.7, rng.uniform(12.0, 30.0)
-        site.put(rail(rng, length), site.travel_m / 2 + rng.uniform(6, 20), y, np.pi / 2, -0.02)
+        site.put(rail(rng, length), site.travel_m / 2 + rng.uniform(6, 20), y, np.pi / 2)
     if rng.random() < 0.3:
         length = rng.uniform(6, 16)
-        site.put(
-            hedge_or_wall(rng, length),
-            site.travel_m + rng.uniform(5, 15),
-            left + 1.5,
-            -np.pi / 2,
-            -0.02,
-        )
-    street_lamps(site, rng, right - 1.2, rng.uniform(18, 30), -0.02)
-    row(site, rng, roadside_thing, right - 1.3, 3.5, np.pi, -0.02, share=0.75, spread=2.0)
-    row(site, rng, roadside_thing, left + 1.3, 4.5, 0.0, -0.02, share=0.7, spread=3.0)
-    row(site, rng, furniture.tree, right - 6.0, 9.0, 0.0, -0.02, share=0.5, spread=3.0)
+        x = site.travel_m + rng.uniform(5, 15)
+        site.put(hedge_or_wall(rng, length), x, left + 1.5, -np.pi / 2)
+    street_lamps(site, rng, right - 1.2, rng.uniform(18, 30))
+    row(site, rng, roadside_thing, right - 1.3, 3.5, np.pi, share=0.75, spread=2.0)
+    row(site, rng, roadside_thing, left + 1.3, 4.5, 0.0, share=0.7, spread=3.0)
+    row(site, rng, furniture.tree, right - 6.0, 9.0, 0.0, share=0.5, spread=3.0)
 
 
 def town_street(site: Site, rng: np.random.Generator) -> None:
     """A street between facades with pavements, parked cars and people who cross."""
     lane, far = rng.uniform(2.8, 3.4), site.travel_m + REACH_M
     parking = rng.uniform(2.0, 2.3)
-    right, left = -lane / 2 - parking, 1.5 * lane + (parking if rng.random() < 0.5 else 0.3)
+    parking_left = parking if rng.random() < 0.5 else 0.3
+    right, left = -lane / 2 - parking, 1.5 * lane + parking_left
     pavement = rng.uniform(1.8, 3.2)
     carriageway(site, rng, right, left, lane, edge_lines=False)
     paving = m.PAVING.draw(rng)
@@ -71,12 +67,13 @@ def town_street(site: Site, rng: np.random.Generator) -> None:
     facades(site, rng, left + pavement, -np.pi / 2)
     lead(site, rng)
     oncoming(site, rng, lane)
-    crossing(site, rng, (right - 0.8, left + 0.8))
+    crossing(site, rng, (right + 0.3, left - 0.3))
     walkers(site, rng, rng.integers(1, 4), (right - pavement + 0.5, right - 0.5), KERB_M)
     walkers(site, rng, rng.integers(0, 3), (left + 0.5, left + pavement - 0.5), KERB_M)
-    cyclists(site, rng, -lane / 2 + 0.3)
+    cyclists(site, rng, -lane / 2 - 0.1)
     row(site, rng, vehicles.car, right + parking / 2 + 0.05, 5.8, 0.0, share=rng.uniform(0.3, 0.9))
-    row(site, rng, vehicles.car, left - parking / 2, 6.0, np.pi, share=rng.uniform(0.2, 0.8))
+    if parking_left == parking:
+        row(site, rng, vehicles.car, left - parking / 2, 6.0, np.pi, share=rng.uniform(0.2, 0.8))
     street_lamps(site, rng, right - 0.5, rng.uniform(13, 20), KERB_M)
     row(site, rng, pavement_thing, right - 0.5, 2.6, np.pi, KERB_M, share=0.6)
     row(site, rng, pavement_thing, left + 0.5, 3.5, 0.0, KERB_M, share=0.5)
@@ -87,12 +84,13 @@ def car_park(site: Site, rng: np.random.Generator) -> None:
     far = site.travel_m + REACH_M
     ground = (m.ASPHALT if rng.random() < 0.6 else m.PAVING).draw(rng)
     site.build(meshes.patch((-BEHIND_M, far), (-REACH_M, REACH_M), 0.0, ground))
-    end = site.travel_m + rng.uniform(1.4, 6.0)
+    end = site.travel_m + rng.uniform(0.75, 6.0)
     bays(site, rng, end, rng.uniform(2.5, 2.9))
     ahead = rng.random()
     if ahead < 0.35:
-        facing = np.pi if rng.random() < 0.5 else 0.0
-        site.put(vehicles.car(rng), end + 2.6, rng.uniform(-0.4, 0.4), facing)
+        car, facing = vehicles.car(rng), np.pi if rng.random() < 0.5 else 0.0
+        half_length = float(car.corners[..., 0].max())
+        site.put(car, end + half_length, rng.uniform(-0.4, 0.4), facing)
         site.put(backdrop(rng), end + rng.uniform(7, 14), rng.uniform(-3, 3), np.pi)
     elif ahead < 0.9:
         site.put(backdrop(rng), end, rng.uniform(-2, 2), np.pi)
@@ -157,7 +155,7 @@ def side_walk(
     return meshes.join(
         [
             meshes.box((length, 0.15, KERB_M), stone, (middle, sum(across) / 2, 0.0)),
-            meshes.patch(x, (outer[0], outer[1]), KERB_M - 0.005, paving),
+            meshes.patch(x, (outer[0], outer[1]), KERB_M, paving),
         ]
     )
 
@@ -169,9 +167,9 @@ def facades(site: Site, rng: np.random.Generator, y: float, yaw: float) -> None:
         length, kind = rng.uniform(6.0, 12.0), rng.random()
         centre = x + length / 2
         if kind < 0.65:
-            site.put(buildings.facade(rng, length, site.night), centre, y, yaw, KERB_M - 0.005)
+            site.put(buildings.facade(rng, length, site.night), centre, y, yaw, KERB_M)
         elif kind < 0.9:
-            site.put(hedge_or_wall(rng, length), centre, y, yaw, KERB_M - 0.005)
+            site.put(hedge_or_wall(rng, length), centre, y, yaw, KERB_M)
         x += length + rng.choice([0.2, 0.2, 3.0])
 
 

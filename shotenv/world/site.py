@@ -50,6 +50,7 @@ class Site:
 
     def __init__(self, ego: Motion, duration_s: float, night: bool = False):
         self.ego = ego
+        self.duration_s = duration_s
         self.night = night
         instants = int(np.clip(np.ceil(duration_s / STEP_S), 2, MAX_INSTANTS))
         self.times = np.linspace(0.0, duration_s, instants)
@@ -68,7 +69,7 @@ class Site:
     @property
     def travel_m(self) -> float:
         """Length of the ego's path."""
-        return self.ego.speed_m_s * float(self.times[-1])
+        return self.ego.speed_m_s * self.duration_s
 
     def build(self, mesh: Mesh) -> None:
         """Add ground, ceilings and other things that nothing can run into."""

@@ -19,30 +19,31 @@ STREET_IRRADIANCE = (1e-3, 2e-2)
 TRIES = 4
 
 
-def walk(
-    site: Site, rng: np.random.Generator, x: float, y: float, yaw: float, z: float = 0.0
-) -> bool:
-    """Somebody on foot at (x, y), standing or walking towards `yaw`."""
-    speed = rng.uniform(0.7, 1.8) if rng.random() < 0.8 else 0.0
-    somebody = people.person(rng, stride_m=0.4 * speed)
-    return site.move(somebody, Motion(Pose((x, y, z), yaw), speed))
-
-
 def walkers(site: Site, rng: np.random.Generator, count: int, y: Range, z: float = 0.0) -> None:
-    """People along the road, either way."""
+    """People who stand or walk along the road, either way."""
+    far = min(site.travel_m + 18.0, site.room[1, 0] - 0.5)
     for _ in range(count):
-        yaw = rng.integers(2) * np.pi + rng.uniform(-0.1, 0.1)
-        walk(site, rng, site.travel_m + rng.uniform(2.5, 18.0), rng.uniform(*y), yaw, z)
+        speed = rng.uniform(0.7, 1.8) if rng.random() < 0.75 else 0.0
+        somebody = people.person(rng, 0.4 * speed)
+        for _ in range(TRIES):
+            yaw = rng.integers(2) * np.pi + rng.uniform(-0.05, 0.05)
+            place = (rng.uniform(site.travel_m + 1.5, far), rng.uniform(*y), z)
+            if site.move(somebody, Motion(Pose(place, yaw), speed)):
+                break
 
 
 def crossing(site: Site, rng: np.random.Generator, y: Range, near: float = 1.5) -> None:
-    """Up to two people who cross in front of the ego."""
+    """Up to two people who cross in front of the ego and stay between `y` during the clip."""
+    span = min(7.0, site.room[1, 0] - site.travel_m - near - 0.5)
     for _ in range(rng.integers(0, 3)):
-        side = rng.choice([-1.0, 1.0])
-        yaw = side * (np.pi / 2 + rng.uniform(-0.25, 0.25))
+        speed = min(rng.uniform(0.7, 1.8), (y[1] - y[0]) / site.duration_s)
+        somebody, room = people.person(rng, 0.4 * speed), y[1] - y[0] - speed * site.duration_s
         for _ in range(TRIES):
-            x = site.travel_m + near + rng.uniform(0.0, 8.0)
-            if walk(site, rng, x, rng.uniform(*y), yaw):
+            start, side = y[0] + rng.uniform() * room, rng.choice([-1.0, 1.0])
+            across = start if side > 0 else y[0] + y[1] - start
+            x = site.travel_m + near + max(span, 0.0) * rng.uniform() ** 1.5
+            yaw = side * np.pi / 2 + rng.uniform(-0.2, 0.2)
+            if site.move(somebody, Motion(Pose((x, across, 0.0), yaw), speed)):
                 break
 
 
@@ -88,7 +89,7 @@ def cyclists(site: Site, rng: np.random.Generator, y: float) -> None:
     """Perhaps somebody on a bicycle at the edge of the lane."""
     if rng.random() < 0.3:
         x, speed = site.travel_m * rng.uniform() + rng.uniform(4.0, 12.0), rng.uniform(2.5, 6.5)
-        site.move(vehicles.cyclist(rng), Motion(Pose((x, y - 0.5, 0.0)), speed))
+        site.move(vehicles.cyclist(rng), Motion(Pose((x, y, 0.0)), speed))
 
 
 def row(

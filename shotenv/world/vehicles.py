@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -169,17 +170,15 @@ def cyclist(rng: np.random.Generator) -> Mesh:
     metal, tyre = m.DARK_METAL.draw(rng), m.TYRE.draw(rng)
     hub_rear, hub_front, crank = (-0.5, 0.0, 0.34), (0.52, 0.0, 0.34), (-0.05, 0.0, 0.30)
     saddle, handle = (-0.2, 0.0, 0.92), (0.38, 0.0, 0.98)
-    tubes = [(hub_rear, crank), (hub_rear, saddle), (crank, saddle), (crank, handle),
-             (saddle, handle), (handle, hub_front), ((0.38, -0.25, 1.0), (0.38, 0.25, 1.0))]  # fmt: skip
-    frame = [meshes.rod(a, b, 0.025, metal, sections=5) for a, b in tubes]
+    joints = [(hub_rear, crank), (hub_rear, saddle), (crank, saddle), (crank, handle)]
+    joints += [(saddle, handle), (handle, hub_front), ((0.38, -0.25, 1.0), (0.38, 0.25, 1.0))]
+    frame = [meshes.rod(a, b, 0.025, metal, sections=4) for a, b in joints]
     hoops = [hoop(hub, 0.34, tyre) for hub in (hub_rear, hub_front)]
     return meshes.join([*frame, *hoops, seated_rider(rng)])
 
 
 def hoop(hub: meshes.Point, radius: float, material: Material) -> Mesh:
     """A bicycle wheel: an upright ring in the x-z plane about its hub."""
-    turns = np.linspace(0, 2 * np.pi, 11)
+    turns = np.linspace(0, 2 * np.pi, 10)
     rim = [(hub[0] + radius * np.cos(a), hub[1], hub[2] + radius * np.sin(a)) for a in turns]
-    return meshes.join(
-        meshes.rod(a, b, 0.03, material, sections=4) for a, b in zip(rim[:-1], rim[1:], strict=True)
-    )
+    return meshes.join(meshes.rod(a, b, 0.03, material, sections=3) for a, b in pairwise(rim))
