@@ -91,7 +91,8 @@ def _posed(world: World, time_s: float) -> np.ndarray:
 
 
 def _place(corners: np.ndarray, pose: Pose) -> np.ndarray:
-    return corners.astype(float) @ rotation(pose).T + np.asarray(pose.position_m)
+    points = corners.reshape(-1, 3).astype(float) @ rotation(pose).T + pose.position_m
+    return points.reshape(-1, 3, 3)
 
 
 def _padding(world: World) -> list[Mesh]:

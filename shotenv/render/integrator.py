@@ -126,17 +126,18 @@ def _follow(
         light.add_active(throughput * laser[0], walked_m + laser[1], frequencies_hz)
         throughput *= hit.albedo
         passive_on = hit.valid & lights.passive_on
-        irradiance = passive.sun(scene, hit, instant, passive_on)
+        irradiance = passive.daylight(scene, hit, instant, sampler, passive_on)
         irradiance += passive.lamps(scene, hit, instant, sampler.next_1d(), passive_on)
         onward = mi.Frame3f(hit.normal).to_world(
             mi.warp.square_to_cosine_hemisphere(sampler.next_2d())
         )
+        seeks_sky = passive_on & ~passive.sky_is_aimed_at(hit)
         if bounce + 1 < camera.bounces:
             previous, hit = hit, scene.hit(hit.leave, onward, instant, hit.valid)
             walked_m += dr.norm(hit.point - previous.point)
-            free = passive_on & ~hit.valid
+            free = seeks_sky & ~hit.valid
         else:
-            free = scene.visible(hit.leave, onward, mi.Float(REACH_M), instant, passive_on)
+            free = scene.visible(hit.leave, onward, mi.Float(REACH_M), instant, seeks_sky)
         sky = dr.select(free, passive.sky(onward), 0)
         light.ambient += throughput * dr.fma(irradiance, dr.inv_pi, sky)
     return light

@@ -14,6 +14,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from shotenv.render.device import upload
 from shotenv.render.geometry import REACH_M, rotation
 from shotenv.render.instants import Instants
 from shotenv.render.scene import Hit, Scene
@@ -55,7 +56,7 @@ class PassiveLight:
         light = world.light
         start, poses = world.ego.at(0.0), [world.ego.at(t) for t in instants.times_s]
         table = np.stack([lamp_table(light.lamps, start, pose) for pose in poses])
-        self._lamps = mi.Float(table.ravel())
+        self._lamps = upload(table)
         self._lamp_count = dr.opaque(mi.UInt32, len(light.lamps))
         self._opening = _Opening(light.indoor)
         self._sun_irradiance = dr.opaque(mi.Float, light.sun_irradiance)

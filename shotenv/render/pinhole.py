@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 
 from shotenv.config import CameraConfig
+from shotenv.render.device import upload
 from shotenv.render.geometry import rotation
 from shotenv.render.instants import Instants
 from shotenv.world.model import Motion
@@ -36,9 +37,8 @@ class Pinhole:
     def __init__(self, ego: Motion, instants: Instants, camera: CameraConfig):
         poses = [ego.at(t) for t in instants.times_s]
         self._camera = camera
-        self._position = mi.Float(np.float32([pose.position_m for pose in poses]).ravel())
-        axes = np.stack([rotation(pose).T for pose in poses])
-        self._axes = mi.Float(axes.astype(np.float32).ravel())
+        self._position = upload(np.array([pose.position_m for pose in poses]))
+        self._axes = upload(np.stack([rotation(pose).T for pose in poses]))
 
     def rays(self, lanes, jitter) -> tuple[Any, Any]:
         """Origin and direction of each lane's ray; sample 0 goes through the pixel's centre."""

@@ -10,6 +10,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from shotenv.render.device import upload
 from shotenv.render.geometry import REACH_M, Geometry
 from shotenv.render.texture import noise_texture
 
@@ -45,10 +46,10 @@ class Scene:
         gc.collect()  # Mitsuba's objects sit in cycles; old scenes go before a new one comes.
         self._static = _mitsuba_scene(geometry.static)
         self._moving = _mitsuba_scene(geometry.moving)
-        self._tile = mi.Float(geometry.tile_m.ravel())
-        self._normals = mi.Float(geometry.normals.ravel())
-        self._surface = mi.Float(geometry.surface.ravel())
-        self._uv = mi.Float(geometry.uv.ravel())
+        self._tile = upload(geometry.tile_m)
+        self._normals = upload(geometry.normals)
+        self._surface = upload(geometry.surface)
+        self._uv = upload(geometry.uv)
         self._noise = mi.Texture2f(
             mi.TensorXf(noise_texture()[..., None]), wrap_mode=dr.WrapMode.Repeat
         )
