@@ -115,7 +115,7 @@ def ego_speed(
     if low * duration_s > LONGEST_DRIVE_M:
         raise ValueError(
             f"speed_m_s is ({low:g}, {high:g}); expected at most {LONGEST_DRIVE_M / duration_s:g} "
-            f"m/s at its low end, for a clip of {duration_s:g} s in a world of {LONGEST_DRIVE_M:g} m"
+            f"at its low end: a clip of {duration_s:g} s is driven in {LONGEST_DRIVE_M:g} m"
         )
     wish = 0.0 if rng.random() < STANDING_SHARE else rng.uniform(*usual)
     return float(np.clip(wish, low, min(high, LONGEST_DRIVE_M / duration_s)))
@@ -126,16 +126,12 @@ def draw_ego(
 ) -> Motion:
     """Path of the camera: a height, a slight pitch, and a bend too slight to leave the lane."""
     height, pitch = float(rng.uniform(*CAMERA_HEIGHT_M)), float(rng.uniform(-0.03, 0.03))
-    yaw, rate = _swerve(rng.normal(0.0, (yaw_std_rad, 0.04)), speed_m_s * duration_s, duration_s)
-    return Motion(Pose((0.0, 0.0, height), yaw, pitch), speed_m_s, rate if speed_m_s > 0 else 0.0)
+    yaw, rate = rng.normal(0.0, (yaw_std_rad, 0.04))
+    # On a shallow arc the path shifts sideways by travel * (yaw + rate * duration / 2).
+    most = WIDEST_SWERVE_M / 2 / max(speed_m_s * duration_s, 1.0)
+    start = Pose((0.0, 0.0, height), _within(most, yaw), pitch)
+    return Motion(start, speed_m_s, _within(2 * most / duration_s, rate) * (speed_m_s > 0))
 
 
-def _swerve(wish: np.ndarray, travel_m: float, duration_s: float) -> tuple[float, float]:
-    """Yaw and yaw rate, kept so small that the path shifts sideways by a few decimetres."""
-    # On a shallow arc the shift is travel * (yaw + rate * duration / 2).
-    most = min(WIDEST_SWERVE_M / max(travel_m, 1e-9) / 2, 0.3)
-    yaw, rate = (
-        np.clip(wish, -most, most)[0],
-        np.clip(wish[1], -2 * most / duration_s, 2 * most / duration_s),
-    )
-    return float(yaw), float(np.clip(rate, -0.1, 0.1))
+def _within(most: float, wish: float) -> float:
+    return float(np.clip(wish, -most, most))

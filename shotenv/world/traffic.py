@@ -21,13 +21,14 @@ TRIES = 4
 
 def walkers(site: Site, rng: np.random.Generator, count: int, y: Range, z: float = 0.0) -> None:
     """People who stand or walk along the road, either way."""
-    far = min(site.travel_m + 18.0, site.room[1, 0] - 0.5)
+    near = site.travel_m + 1.5
+    far = max(near, min(near + 17.0, site.room[1, 0] - 0.5))
     for _ in range(count):
         speed = rng.uniform(0.7, 1.8) if rng.random() < 0.75 else 0.0
         somebody = people.person(rng, 0.4 * speed)
         for _ in range(TRIES):
             yaw = rng.integers(2) * np.pi + rng.uniform(-0.05, 0.05)
-            place = (rng.uniform(site.travel_m + 1.5, far), rng.uniform(*y), z)
+            place = (rng.uniform(near, far), rng.uniform(*y), z)
             if site.move(somebody, Motion(Pose(place, yaw), speed)):
                 break
 
