@@ -11,13 +11,23 @@ N drives, T frames, A = 3 actions throughout; temperatures in kelvin, heat in jo
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 Advance = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 Choice = Callable[["Situation"], np.ndarray]
+Name = TypeVar("Name")
+
+
+class Rule(NamedTuple):
+    """Parameters of a one-threshold rule: actions below and above `limit`."""
+
+    limit: float
+    below: int
+    above: int
 
 
 @dataclass(frozen=True)
@@ -34,8 +44,10 @@ class DriveTable:
         Heat that each action leaves in the laser.
     start_k : float64 [N]
         Laser temperature before the first frame.
-    highest_k : float64
-        No laser gets hotter than this, whatever is chosen.
+    snr : float64 [N, T, A]
+        The observed feature `signal_to_noise` after each action.
+    span_k : (low, high)
+        No laser gets colder or hotter than this, whatever is chosen.
     advance : callable
         The laser's thermal model over one frame: (temperature_k, tripped, heat_j), each [N, ...],
         to the next (temperature_k, tripped). With `tripped`, the heat given is zero.
@@ -45,17 +57,31 @@ class DriveTable:
     tripped_cost: np.ndarray
     heat_j: np.ndarray
     start_k: np.ndarray
-    highest_k: float
+    snr: np.ndarray
+    span_k: tuple[float, float]
     advance: Advance
 
 
 @dataclass(frozen=True)
 class Situation:
-    """What a choice may depend on: frame, laser state of each drive, and each action's outcome."""
+    """What a choice may depend on; a policy that is not clairvoyant looks at `snr` at most.
+
+    Attributes
+    ----------
+    frame : int
+        Number of the frame.
+    temperature_k, tripped : [N]
+        State of each drive's laser.
+    snr : [N]
+        Feature `signal_to_noise` of the last acquisition, 0 before the first.
+    table : DriveTable
+        What each action would bring.
+    """
 
     frame: int
     temperature_k: np.ndarray
     tripped: np.ndarray
+    snr: np.ndarray
     table: DriveTable
 
     @property
@@ -95,12 +121,14 @@ def play(table: DriveTable, choose: Choice) -> Played:
     """Play every drive of `table`, asking `choose` for the actions [N] of each frame."""
     drives, frames, _ = table.cost.shape
     temperature_k, tripped = table.start_k.copy(), np.zeros(drives, dtype=bool)
-    rows, actions, cost = np.arange(drives), np.empty((drives, frames), np.int64), np.zeros(drives)
+    rows, actions = np.arange(drives), np.empty((drives, frames), np.int64)
+    cost, snr = np.zeros(drives), np.zeros(drives)
     for frame in range(frames):
-        chosen = choose(Situation(frame, temperature_k, tripped, table))
+        chosen = choose(Situation(frame, temperature_k, tripped, snr, table))
         actions[:, frame] = np.where(tripped, -1, chosen)
         working = table.cost[rows, frame, chosen]
         cost += np.where(tripped, table.tripped_cost[:, frame], working)
+        snr = np.where(tripped, snr, table.snr[rows, frame, chosen])
         heat_j = np.where(tripped, 0.0, table.heat_j[rows, frame, chosen])
         temperature_k, tripped = table.advance(temperature_k, tripped, heat_j)
     return Played(actions, cost)
@@ -108,7 +136,7 @@ def play(table: DriveTable, choose: Choice) -> Played:
 
 def clairvoyant(table: DriveTable, *, levels: int = 801) -> Played:
     """Optimum over all choices, by dynamic programming on `levels` temperatures."""
-    grid = _temperature_grid(table, levels)
+    grid = np.linspace(*table.span_k, levels)
     values = _values_to_go(table, grid)
     drives = np.arange(table.cost.shape[0])
 
@@ -156,6 +184,25 @@ def mixture(shares: tuple[float, float, float], *, seed: int = 0) -> Choice:
     return choose
 
 
+def threshold(limit: float, below: int, above: int) -> Choice:
+    """One action where the last signal-to-noise is below `limit`, another from there on."""
+    return lambda now: np.where(now.snr < limit, below, above)
+
+
+def threshold_choices(table: DriveTable, limits: int = 40) -> Iterator[tuple[Rule, Choice]]:
+    """Every pair of actions in either order, with thresholds at quantiles of the feature."""
+    quantiles = np.quantile(table.snr, np.linspace(0.01, 0.99, limits))
+    for limit, (below, above) in itertools.product(
+        np.unique(quantiles).tolist(), itertools.permutations(range(3), 2)
+    ):
+        yield Rule(limit, below, above), threshold(limit, below, above)
+
+
+def best_choice(table: DriveTable, choices: Iterable[tuple[Name, Choice]]) -> Name:
+    """Name of the choice that costs least over all drives of `table`."""
+    return min(choices, key=lambda choice: play(table, choice[1]).cost.sum())[0]
+
+
 def blind_choices(longest: int = 8, steps: int = 5) -> Iterator[tuple[str, Choice]]:
     """Choices that look at nothing: fixed, one frame in n different, and mixtures on a grid."""
     for action in range(3):
@@ -172,11 +219,6 @@ def blind_choices(longest: int = 8, steps: int = 5) -> Iterator[tuple[str, Choic
 
 
 _SHOTS = (2, 4, 8)
-
-
-def _temperature_grid(table: DriveTable, levels: int) -> np.ndarray:
-    lowest = float(table.start_k.min()) - 1.0
-    return np.linspace(lowest, table.highest_k, levels)
 
 
 def _values_to_go(table: DriveTable, grid: np.ndarray) -> np.ndarray:
