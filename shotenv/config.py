@@ -45,7 +45,9 @@ class SensorConfig(Section):
     f1_hz: Positive = Field(24e6, description="first modulation frequency, Hz")
     f2_hz: Positive = Field(10e6, description="second modulation frequency, Hz")
     sample_period_s: Positive = Field(3.85e-3, description="time from one DCS to the next, s")
-    integration_s: Range = Field((3e-4, 1e-3), description="integration time drawn per drive, s")
+    integration_s: Range = Field(
+        (5.5e-4, 7.5e-4), description="integration time drawn per drive, s"
+    )
     wavelength_nm: Positive = Field(940.0, description="laser wavelength, nm")
     f_number: Positive = Field(1.2, description="lens f-number")
     lens_transmission: Fraction = Field(0.8, description="lens and filter transmission")
@@ -177,7 +179,7 @@ class EnvConfig(Section):
     merge: Literal["nearest", "floor"] = Field(
         "nearest", description="how prediction and wrapped map merge: ours, or eq. 6"
     )
-    observation: Literal["features", "image"] = Field("features", description="what is observed")
+    observation: Literal["features"] = Field("features", description="what is observed")
     frames_per_drive: int = Field(256, ge=2, description="frames of one episode")
     frame_rate_hz: Positive = Field(10.0, description="frames per second")
     reward: RewardConfig = RewardConfig()

@@ -1,0 +1,148 @@
+"""A tiny bank and an untrained network: what tests of sensor, environment and agents stand on.
+
+The bank's light is drawn from closed forms (walls, boxes and floors at known distances, moving
+at known speeds), so no renderer is needed.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from shotenv.bank.store import write_clip, write_manifest
+from shotenv.config import FAMILIES, BankConfig, SensorConfig, find_config, read_config
+from shotenv.sensor import capture_gray
+from unwrap.acquisition import demodulation_phase_rad, frequency_index, sample_times_s
+from unwrap.nets import TofRegNet
+from unwrap.weights import save_weights
+
+SPEED_OF_LIGHT_M_S = 299_792_458.0
+HEIGHT, WIDTH = 24, 32
+CLIPS, FRAMES_PER_CLIP = 16, 4
+LASER_SOLID_ANGLE_SR = 0.8
+AMBIENT_IRRADIANCE_W_M2 = {
+    "sunny_road": 8.0,
+    "overcast_street": 1.0,
+    "garage": 0.03,
+    "tunnel": 0.1,
+    "night_road": 1e-4,
+}
+
+
+@pytest.fixture(scope="session")
+def sensor() -> SensorConfig:
+    return read_config(SensorConfig, find_config("sensor", "epc660"))
+
+
+def scene_at(family: str, seed: int, time_s: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """Distance [H, W], albedo [H, W] and ego speed: a wall and a box over a floor, drawing near."""
+    random = np.random.default_rng(seed)
+    wall_m, box_m, speed_m_s = random.uniform(10, 30), random.uniform(3, 9), random.uniform(0, 8)
+    rows = np.arange(HEIGHT)[:, None] * np.ones((1, WIDTH))
+    # Below the horizon a floor 1.2 m down, seen under 1.5 degrees per row.
+    below = np.deg2rad(np.maximum(rows - HEIGHT / 2, 0.5) * 1.5)
+    distance = np.minimum(wall_m, 1.2 / np.sin(below))
+    albedo = 0.15 + 0.35 * random.random((HEIGHT, WIDTH))
+    left = int(random.integers(0, WIDTH - 10))
+    distance[6:18, left : left + 8] = box_m
+    albedo[6:18, left : left + 8] = random.uniform(0.05, 0.9)
+    distance = distance - speed_m_s * time_s * 0.1
+    if family in ("sunny_road", "overcast_street", "night_road"):
+        distance[:4] = np.inf
+    return distance, albedo, float(speed_m_s)
+
+
+def light_of(family: str, seed: int, time_s: float, sensor: SensorConfig) -> dict[str, np.ndarray]:
+    """Closed-form light of one frame: one bounce, every sample at its own instant."""
+    times = [time_s + t for t in sample_times_s(8, sensor.sample_period_s)]
+    frequencies = (sensor.f1_hz, sensor.f2_hz)
+    correlation, active = [], []
+    for k, instant in enumerate(times):
+        distance, albedo, _ = scene_at(family, seed, instant)
+        radiance = albedo / math.pi / (LASER_SOLID_ANGLE_SR * distance**2)
+        hit = np.where(np.isinf(distance), 0.0, distance)
+        phase = 4 * math.pi * frequencies[frequency_index(k)] * hit / SPEED_OF_LIGHT_M_S
+        correlation.append(radiance * np.cos(phase - demodulation_phase_rad(k)))
+        active.append(radiance)
+    distance, albedo, _ = scene_at(family, seed, time_s)
+    irradiance = AMBIENT_IRRADIANCE_W_M2[family] * (1 + 0.3 * math.sin(seed + time_s))
+    light = {
+        "correlation": np.stack(correlation),
+        "active": np.mean(active, axis=0),
+        "ambient": np.where(np.isinf(distance), 2.0, albedo) * irradiance / math.pi,
+        "distance_m": distance,
+    }
+    return {name: value.astype(np.float32) for name, value in light.items()}
+
+
+def write_tiny_bank(folder, sensor: SensorConfig) -> None:
+    """One clip of each family in each split, and one more for training."""
+    records = []
+    for number in range(CLIPS):
+        family = FAMILIES[number % len(FAMILIES)]
+        split = ("train", "validation", "test")[number // len(FAMILIES) % 3]
+        times = [0.1 * i for i in range(FRAMES_PER_CLIP)]
+        light = [light_of(family, number, time, sensor) for time in times]
+        arrays = {name: np.stack([frame[name] for frame in light]) for name in light[0]}
+        noise = torch.randn(
+            arrays["ambient"].shape, generator=torch.Generator().manual_seed(number)
+        )
+        gray, exposure_s = capture_gray(torch.from_numpy(arrays["ambient"]), sensor, noise=noise)
+        arrays["gray"] = gray.numpy().astype(np.uint16)
+        name = f"{number:03d}-{family}"
+        metadata = {
+            "name": name,
+            "family": family,
+            "seed": number,
+            "split": split,
+            "time_s": times,
+            "ego_speed_m_s": [scene_at(family, number, 0.0)[2]] * FRAMES_PER_CLIP,
+            "yaw_rate_rad_s": [0.1 * math.sin(number)] * FRAMES_PER_CLIP,
+            "gray_exposure_s": exposure_s.tolist(),
+        }
+        records.append(write_clip(folder / "clips" / name, arrays, metadata))
+    write_manifest(folder, "tiny", records, (HEIGHT, WIDTH), BankConfig(name="tiny", sensor=sensor))
+
+
+@pytest.fixture(scope="session")
+def session_cache(tmp_path_factory) -> str:
+    """Cache folder of the whole test session; nothing is written into the user's own."""
+    return str(tmp_path_factory.mktemp("cache"))
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(session_cache, monkeypatch):
+    monkeypatch.setenv("SHOTENV_CACHE", session_cache)
+
+
+@pytest.fixture(scope="session")
+def tiny_bank(tmp_path_factory, sensor) -> str:
+    """Path of a bank: 16 clips of 4 frames, 32 x 24 pixels, five families, three splits."""
+    folder = tmp_path_factory.mktemp("banks") / "tiny"
+    write_tiny_bank(folder, sensor)
+    return str(folder)
+
+
+@pytest.fixture(scope="session")
+def tiny_unwrapper(tmp_path_factory, sensor) -> str:
+    """Path of an untrained TofRegNet of width 4; fast, and wrong in a fixed way."""
+    torch.manual_seed(0)
+    path = tmp_path_factory.mktemp("weights") / "tiny.safetensors"
+    # Untrained outputs lie about the middle of the range; this puts them about the first wrap,
+    # and the stronger head spreads them.
+    range_m = SPEED_OF_LIGHT_M_S / sensor.f1_hz
+    network = TofRegNet(width=4, range_m=range_m)
+    network.head.weight.data.mul_(30.0)
+    network.head.bias.data.zero_()
+    metadata = {"network": "tofregnet", "width": 4, "range_m": range_m, "f1_hz": sensor.f1_hz}
+    save_weights(path, network, metadata)
+    return str(path)
+
+
+@pytest.fixture(scope="session")
+def tiny_kwargs(tiny_bank, tiny_unwrapper) -> dict[str, object]:
+    """Keyword arguments of an environment on the tiny bank."""
+    return {"bank": tiny_bank, "unwrapper": tiny_unwrapper, "frames_per_drive": 32}
