@@ -39,7 +39,7 @@ def garage(site: Site, rng: np.random.Generator, irradiance: m.Range) -> None:
         parked(site, rng, end, side * (aisle / 2 + depth / 2 + 0.2), bay, side)
     if near and rng.random() < 0.5:
         site.put(vehicles.car(rng), end - 1.2, rng.uniform(-0.5, 0.5), np.pi / 2)
-    ceiling_lamps(site, rng, (-6.0, end), height, irradiance, (-aisle / 4, aisle / 4))
+    ceiling_lamps(site, rng, (-7.0, end), height, irradiance, (-aisle / 4, aisle / 4))
     crossing(site, rng, (-aisle / 2, aisle / 2), near=0.8)
     walkers(site, rng, rng.integers(1, 3), (-aisle / 2 + 0.3, aisle / 2 - 0.3))
     if rng.random() < 0.35:
@@ -140,11 +140,11 @@ def ceiling_lamps(
     """Tubes under a ceiling along x, all of one kind, a few of them dead."""
     intensity = lights.intensity_for(rng, irradiance, height)
     radiance = lights.face_radiance(intensity, TUBE_LAMP_M * TUBE_WIDTH_M)
-    casing, pitch = m.WHITE_PAINT.draw(rng), rng.uniform(4.0, 7.0)
+    casing, pitch = m.WHITE_PAINT.draw(rng), rng.uniform(3.5, 6.0)
     low = height - 0.14
     for along in np.arange(x[0] + 1.5, x[1] - 1.0, pitch):
         for y in rows:
-            alive = rng.random() < 0.85
+            alive = rng.random() < 0.92
             tube = buildings.tube_lamp(TUBE_LAMP_M, radiance if alive else 0.0, casing, height)
             site.build(meshes.at(tube, along, y))
             if alive:
