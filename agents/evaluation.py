@@ -112,17 +112,16 @@ def play_drives(
     frames: list[dict[str, np.ndarray]] = []
     done = np.zeros(len(seeds), dtype=bool)
     while not done.all():
-        family = np.asarray(infos["family"])
         actions = policy.act(observations, infos)
         observations, rewards, terminated, truncated, infos = envs.step(actions)
         done = terminated | truncated
-        frames.append(_frame(rewards, family, infos))
+        frames.append(_frame(rewards, infos))
         tick(len(seeds))
     stacked = {name: np.stack([frame[name] for frame in frames], axis=1) for name in frames[0]}
     return Played(seeds=np.asarray(seeds), **stacked)
 
 
-def _frame(rewards: np.ndarray, family: np.ndarray, infos: Mapping[str, Any]) -> dict[str, Any]:
+def _frame(rewards: np.ndarray, infos: Mapping[str, Any]) -> dict[str, Any]:
     told = infos.get("final_info", infos)
     off = np.asarray(told["shots"]) == 0
     return {
@@ -133,7 +132,7 @@ def _frame(rewards: np.ndarray, family: np.ndarray, infos: Mapping[str, Any]) ->
         "depth_mae_m": np.where(off, np.nan, told["depth_mae_m"]),
         "wrap_accuracy": np.where(off, np.nan, told["wrap_accuracy"]),
         "temperature_k": np.array(told["temperature_k"]),
-        "family": family,
+        "family": np.array(told["family"], dtype=np.str_),
     }
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from gymnasium.utils import seeding
 from torch import Tensor
 
 from agents.optimum import Advance, DriveTable
@@ -13,6 +14,7 @@ from agents.policies import SNR_FEATURE
 from shotenv.config import LaserConfig, RewardConfig
 from shotenv.core import Outcomes, Problem, outcomes_of_all_actions
 from shotenv.drive import Drive, draw_drive
+from shotenv.env import drive_seed
 from shotenv.laser import thermal_step, trip_step
 from shotenv.observe import SEEN_FEATURES
 from shotenv.reward import reward
@@ -60,18 +62,23 @@ class Possible:
 def tabulate(
     problem: Problem, seeds: Sequence[int], *, tick: Callable[[int], object] = lambda frames: None
 ) -> Possible:
-    """Play every action in every frame of the drives with the given seeds.
+    """Play every action in every frame of the drives that environments have with these seeds.
 
     `tick` is told the number of frames after each drive.
     """
-    bank = problem.bank
     drives, outcomes = [], []
     for seed in seeds:
-        drive = draw_drive(seed, problem.config, problem.clips, bank.height, bank.width)
-        drives.append(drive)
-        outcomes.append(outcomes_of_all_actions(problem, drive))
+        drives.append(drive_of(problem, seed))
+        outcomes.append(outcomes_of_all_actions(problem, drives[-1]))
         tick(problem.config.frames_per_drive)
     return Possible(problem, tuple(drives), tuple(outcomes))
+
+
+def drive_of(problem: Problem, seed: int) -> Drive:
+    """The first drive of an environment after `reset(seed=seed)`."""
+    generator, _ = seeding.np_random(seed)
+    bank, config = problem.bank, problem.config
+    return draw_drive(drive_seed(generator), config, problem.clips, bank.height, bank.width)
 
 
 def thermal_model(ambient_k: np.ndarray, laser: LaserConfig, period_s: float) -> Advance:

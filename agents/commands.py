@@ -1,0 +1,156 @@
+"""What each command does. Every function takes parsed arguments and returns the exit status."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from jsonargparse import Namespace
+
+from agents.files import write_json
+from agents.progress import progress, say
+from shotenv.config import BankConfig, DemoConfig
+
+DONE, FAILED = 0, 1
+
+
+def doctor(arguments: Namespace) -> int:
+    """Say what is installed and what is missing."""
+    from agents.doctor import examine
+
+    findings = examine()
+    for finding in findings:
+        print(finding)
+    _write_json(arguments, [vars(finding) for finding in findings])
+    return DONE if all(finding.well for finding in findings) else FAILED
+
+
+def demo(arguments: Namespace) -> int:
+    """The main job, small."""
+    from agents.study import run_demo
+
+    return _report(arguments, run_demo(_experiment(arguments), arguments.out))
+
+
+def train(arguments: Namespace) -> int:
+    """Train a scheduler."""
+    from agents.study import train_scheduler
+
+    train_scheduler(_experiment(arguments), arguments.out)
+    print(f"The scheduler is in {arguments.out}; `shotenv evaluate {arguments.out}` judges it.")
+    return DONE
+
+
+def evaluate(arguments: Namespace) -> int:
+    """Judge a trained scheduler."""
+    from agents.policies import PpoPolicy
+    from agents.study import evaluate_scheduler
+
+    scheduler = PpoPolicy.load(arguments.scheduler)
+    results = evaluate_scheduler(_experiment(arguments), scheduler, arguments.out)
+    return _report(arguments, results)
+
+
+def report(arguments: Namespace) -> int:
+    """Write the page of an evaluation anew."""
+    from agents.report import write_report
+
+    print(write_report(arguments.results))
+    return DONE
+
+
+def _report(arguments: Namespace, results: dict[str, Any]) -> int:
+    from agents.report import write_report
+    from agents.results import verdict
+
+    page = write_report(arguments.out)
+    _write_json(arguments, results)
+    print(f"\n{verdict(results)}\n\nReport: {page.resolve()}")
+    return DONE
+
+
+def problem(arguments: Namespace) -> int:
+    """Measure the decision problem."""
+    from agents.evaluation import drive_seeds
+    from agents.problem import measure_problem, print_problem
+    from agents.tables import tabulate
+    from shotenv.core import open_problem
+
+    config = _experiment(arguments)
+    counts = {"validation": config.study.tuning_drives, "test": config.study.drives}
+    frames = sum(counts.values()) * config.env.frames_per_drive
+    problems = {
+        split: open_problem(config.env.model_copy(update={"split": split})) for split in counts
+    }
+    with progress(frames, "playing every action in every frame", "frame") as bar:
+        possible = [
+            tabulate(problems[split], drive_seeds(config.study, count), tick=bar.update)
+            for split, count in counts.items()
+        ]
+    found = measure_problem(*possible, config.env.reward, config.study)
+    print_problem(found, config.study.confidence)
+    _write_json(arguments, found)
+    return DONE
+
+
+def render(arguments: Namespace) -> int:
+    """Render a bank."""
+    from shotenv.bank.build import build_bank
+
+    config = BankConfig(**{name: arguments[name] for name in BankConfig.model_fields})
+    folder = build_bank(config, arguments.out, workers=arguments.workers)
+    print(f"The bank is in {folder}")
+    return DONE
+
+
+def bank_info(arguments: Namespace) -> int:
+    """Tell what is in a bank."""
+    from shotenv.bank import open_bank
+
+    bank = open_bank(arguments.bank)
+    counts: dict[str, dict[str, int]] = {}
+    for clip in bank.clips:
+        families = counts.setdefault(clip.split, {})
+        families[clip.family] = families.get(clip.family, 0) + clip.frames
+    print(f"{bank.folder}: {len(bank)} frames of {bank.width} x {bank.height} pixels")
+    for split, families in counts.items():
+        print(f"  {split:12}" + ", ".join(f"{name} {n}" for name, n in families.items()))
+    about = {"folder": str(bank.folder), "frames": len(bank), "splits": counts}
+    _write_json(arguments, {**about, "fingerprint": bank.fingerprint})
+    return DONE
+
+
+def bank_verify(arguments: Namespace) -> int:
+    """Check every file of a bank against its checksum."""
+    from shotenv.bank import open_bank
+    from shotenv.bank.store import verify
+
+    folder = open_bank(arguments.bank).folder
+    damaged = verify(folder)
+    for name in damaged:
+        say(f"shotenv: {folder / name} is damaged; delete {folder} and render it again")
+    if not damaged:
+        print(f"{folder}: every file is as it was written")
+    _write_json(arguments, {"folder": str(folder), "damaged": list(damaged)})
+    return FAILED if damaged else DONE
+
+
+def unwrap_train(arguments: Namespace) -> int:
+    """Train an unwrapping network."""
+    from shotenv.bank import open_bank
+    from unwrap.train import TrainConfig, train
+
+    config = TrainConfig(**{name: arguments[name] for name in TrainConfig.model_fields})
+    print(f"The network is in {train(config, open_bank(config.bank).folder, arguments.out)}")
+    return DONE
+
+
+def _experiment(arguments: Namespace) -> DemoConfig:
+    return DemoConfig(env=arguments.env, agent=arguments.agent, study=arguments.study)
+
+
+def _write_json(arguments: Namespace, numbers: Any) -> None:
+    path: Path | None = arguments.json
+    if path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_json(path, numbers)
