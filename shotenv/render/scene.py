@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,7 +42,6 @@ class Scene:
     """
 
     def __init__(self, geometry: Geometry):
-        gc.collect()  # Mitsuba's objects sit in cycles; old scenes go before a new one comes.
         self._static = _mitsuba_scene(geometry.static)
         self._moving = _mitsuba_scene(geometry.moving)
         self._tile = upload(geometry.tile_m)
@@ -116,12 +114,24 @@ def _mitsuba_scene(corners: np.ndarray):
     return mi.load_dict({"type": "scene", "mesh": triangle_mesh(corners)})
 
 
-def triangle_mesh(corners: np.ndarray, **properties):
-    """A Mitsuba mesh of triangles [F, 3, 3] that share no corners."""
+def triangle_mesh(corners: np.ndarray, bsdf: Any = None, **attributes: np.ndarray) -> Any:
+    """A Mitsuba mesh of triangles [F, 3, 3] that share no corners.
+
+    `attributes` such as `face_albedo` or `vertex_texcoords` are flattened; those of faces have
+    one channel.
+    """
     faces = len(corners)
-    mesh = mi.Mesh("triangles", 3 * faces, faces, **properties)
+    properties = mi.Properties()
+    if bsdf is not None:
+        properties["bsdf"] = bsdf
+    textured = "vertex_texcoords" in attributes
+    mesh = mi.Mesh("triangles", 3 * faces, faces, properties, has_vertex_texcoords=textured)
+    for name in attributes:
+        if name.startswith("face_"):
+            mesh.add_attribute(name, 1, np.zeros(faces, np.float32))
     values = mi.traverse(mesh)
-    values["vertex_positions"] = mi.Float(np.ascontiguousarray(corners, np.float32).ravel())
+    for name, array in {"vertex_positions": corners, **attributes}.items():
+        values[name] = mi.Float(np.ascontiguousarray(array, np.float32).ravel())
     values["faces"] = dr.arange(mi.UInt32, 3 * faces)
     values.update()
     return mesh

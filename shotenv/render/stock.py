@@ -1,0 +1,92 @@
+"""The same world as a stock Mitsuba scene, so that Mitsuba's own integrators can render it.
+
+Nothing of the sensor is made with it: tests compare the integrator with it, benchmarks race it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from shotenv.config import CameraConfig
+from shotenv.render.geometry import geometry_at, rotation
+from shotenv.render.scene import triangle_mesh
+from shotenv.render.texture import noise_texture
+from shotenv.world.model import Light, Pose, World
+
+_NEAR_CLIP_M = 1e-3
+
+
+def stock_scene(world: World, time_s: float, camera: CameraConfig) -> Any:
+    """A Mitsuba scene of `world` at `time_s`: surfaces, sun, a uniform sky, the camera.
+
+    The sky has its zenith radiance everywhere; there are no lamps and no laser.
+    """
+    description = {
+        "type": "scene",
+        "triangles": _triangles(world, time_s),
+        "sky": {"type": "constant", "radiance": world.light.sky_zenith},
+        "sensor": _sensor(world.ego.at(time_s), camera),
+        **_sun(world.light),
+    }
+    return mi.load_dict(description)
+
+
+def stock_path(camera: CameraConfig) -> Any:
+    """Mitsuba's path integrator for as many surface hits as the camera's light paths have."""
+    return mi.load_dict({"type": "path", "max_depth": camera.bounces + 1, "rr_depth": 1000})
+
+
+def _triangles(world: World, time_s: float) -> Any:
+    geometry = geometry_at(world, (time_s,), bounces=1)
+    corners = np.concatenate([geometry.static, geometry.moving - geometry.tile_m[0]])
+    first, along, across = np.split(geometry.uv[:, :6], 3, axis=1)
+    low, high, _, emission = geometry.surface.T
+    return triangle_mesh(
+        corners,
+        mi.load_dict(_textured()),
+        vertex_texcoords=np.stack([first, first + along, first + across], axis=1),
+        face_low=low,
+        face_high=high,
+    )
+
+
+def _textured() -> dict[str, Any]:
+    def diffuse(attribute: str) -> dict[str, Any]:
+        return {"type": "diffuse", "reflectance": {"type": "mesh_attribute", "name": attribute}}
+
+    noise = {
+        "type": "bitmap",
+        "bitmap": mi.Bitmap(noise_texture()[..., None]),
+        "raw": True,
+        "wrap_mode": "repeat",
+    }
+    blend = {"type": "blendbsdf", "weight": noise, "a": diffuse("face_low")}
+    return {"type": "twosided", "bsdf": {**blend, "b": diffuse("face_high")}}
+
+
+def _sensor(pose: Pose, camera: CameraConfig) -> dict[str, Any]:
+    ahead, _, up = rotation(pose).T
+    eye = np.asarray(pose.position_m)
+    film = {"width": camera.width, "height": camera.height, "rfilter": {"type": "box"}}
+    return {
+        "type": "perspective",
+        "fov": camera.horizontal_fov_deg,
+        "fov_axis": "x",
+        "near_clip": _NEAR_CLIP_M,
+        "to_world": mi.ScalarTransform4f().look_at(
+            origin=eye.tolist(), target=(eye + ahead).tolist(), up=up.tolist()
+        ),
+        "film": {"type": "hdrfilm", "pixel_format": "luminance", **film},
+        "sampler": {"type": "independent"},
+    }
+
+
+def _sun(light: Light) -> dict[str, Any]:
+    if light.sun_irradiance == 0:
+        return {}
+    away = [-component for component in light.sun_direction]
+    return {"sun": {"type": "directional", "direction": away, "irradiance": light.sun_irradiance}}
