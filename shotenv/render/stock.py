@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 
@@ -44,7 +43,7 @@ def _triangles(world: World, time_s: float) -> Any:
     geometry = geometry_at(world, (time_s,), bounces=1)
     corners = np.concatenate([geometry.static, geometry.moving - geometry.tile_m[0]])
     first, along, across = np.split(geometry.uv[:, :6], 3, axis=1)
-    low, high, _, emission = geometry.surface.T
+    low, high, *_ = geometry.surface.T
     return triangle_mesh(
         corners,
         mi.load_dict(_textured()),

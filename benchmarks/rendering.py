@@ -1,0 +1,90 @@
+"""A frame of the sensor against Mitsuba's own path integrator shooting as many rays.
+
+Both render the same world at the same resolution and number of surface hits. The frame includes
+posing what moves, building its acceleration structures and copying the results to NumPy;
+Mitsuba's scene is built beforehand and stands still.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from shotenv.config import CameraConfig, SensorConfig, WorldConfig, find_config, read_config
+from shotenv.render import render_frame
+from shotenv.render.llvm import start_mitsuba
+from shotenv.world import draw_world
+from shotenv.world.model import World
+from unwrap.acquisition import Shots
+
+GOAL = 1.3
+ROUNDS = 9
+SEED = 2
+
+
+def run() -> list[dict[str, Any]]:
+    """Median time of a frame over that of the path integrator, rounds alternating."""
+    camera, sensor = CameraConfig(), read_config(SensorConfig, find_config("sensor", "epc660"))
+    world = _without_lamps(draw_world("sunny_road", SEED, WorldConfig()))
+    path = _path_render(world, camera)
+    ours, theirs = alternating(
+        lambda i: render_frame(world, 0.0, camera, sensor, seed=i), path, ROUNDS
+    )
+    ratio = ours / theirs
+    samples = (int(Shots.EIGHT) + camera.gray_instants) * camera.samples_per_pixel
+    note = (
+        f"{1e3 * ours:.0f} ms for a frame of {camera.width} x {camera.height}, {samples} paths a "
+        f"pixel, {camera.bounces} bounces; path integrator {1e3 * theirs:.0f} ms for as many rays"
+    )
+    return [{"name": "render", "ratio": ratio, "goal": GOAL, "holds": ratio <= GOAL, "note": note}]
+
+
+def alternating(
+    ours: Callable[[int], Any], theirs: Callable[[int], Any], rounds: int
+) -> tuple[float, float]:
+    """Median seconds of two functions called in turn, after a round that is not counted."""
+    times: tuple[list[float], list[float]] = ([], [])
+    for index in range(rounds + 1):
+        for function, record in zip((ours, theirs), times, strict=True):
+            start = time.perf_counter()
+            function(index)
+            record.append(time.perf_counter() - start)
+    return statistics.median(times[0][1:]), statistics.median(times[1][1:])
+
+
+def rays_per_pixel(camera: CameraConfig) -> tuple[int, int]:
+    """Rays of a frame, and of one sample of the path integrator, in a world without lamps.
+
+    A laser sample shoots a ray per surface hit and, from the second on, one to the laser; a
+    passive sample and the path integrator one per hit, one to the sun, and a last one to the sky.
+    """
+    hits = camera.bounces
+    passive = 2 * hits + 1
+    instants = int(Shots.EIGHT) * (2 * hits - 1) + camera.gray_instants * passive
+    return instants * camera.samples_per_pixel, passive
+
+
+def _path_render(world: World, camera: CameraConfig) -> Callable[[int], np.ndarray]:
+    mitsuba = start_mitsuba()
+    from shotenv.render.stock import stock_path, stock_scene
+
+    scene, integrator = stock_scene(world, 0.0, camera), stock_path(camera)
+    rays, rays_per_sample = rays_per_pixel(camera)
+    samples = round(rays / rays_per_sample)
+    return lambda seed: np.array(
+        mitsuba.render(scene, integrator=integrator, spp=samples, seed=seed)
+    )
+
+
+def _without_lamps(world: World) -> World:
+    light = world.light
+    return replace(world, light=replace(light, lamps=(), sky_horizon=light.sky_zenith))
+
+
+if __name__ == "__main__":
+    print(run())
