@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import shutil
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +35,19 @@ RENDERING_VERSION = 1
 
 SECONDS_PER_MILLION_RAYS = 0.3
 """Camera rays with two bounces, one core, measured; only used to announce a duration."""
+
+ACQUISITION_FIELDS = {
+    "integration_s",
+    "contrast",
+    "offset_std_lsb",
+    "offset_row_share",
+    "offset_calibrated_share",
+    "offset_ambient_lsb",
+    "min_snr",
+    "saturation_range_m",
+    "max_range_m",
+}
+"""Fields of the sensor that neither light nor gray image depend on: a bank serves all of them."""
 
 FRAMES_PER_WORKER = 512
 """Rendered frames after which a worker process is replaced: rebuilding scenes leaks memory."""
@@ -84,10 +97,8 @@ def cache_dir() -> Path:
 
 def bank_folder(config: BankConfig) -> Path:
     """Where the bank of `config` lies; another configuration lies elsewhere."""
-    content = json.dumps([RENDERING_VERSION, config.model_dump(mode="json")], sort_keys=True)
-    return (
-        cache_dir() / "banks" / f"{config.name}-{hashlib.sha256(content.encode()).hexdigest()[:8]}"
-    )
+    content = json.dumps(_identity(config), sort_keys=True)
+    return cache_dir() / "banks" / f"{config.name}-{sha256(content.encode()).hexdigest()[:8]}"
 
 
 def build_bank(
@@ -135,7 +146,9 @@ def _make_folder(folder: Path) -> None:
 
 
 def _identity(config: BankConfig) -> dict:
-    return {"rendering_version": RENDERING_VERSION, "config": config.model_dump(mode="json")}
+    """Everything that the bank's content depends on."""
+    content = config.model_dump(mode="json", exclude={"sensor": ACQUISITION_FIELDS})
+    return {"rendering_version": RENDERING_VERSION, "config": content}
 
 
 def _same_config(folder: Path, config: BankConfig) -> bool:
