@@ -11,6 +11,7 @@ import torch
 
 from shotenv.bank import BankError, open_bank
 from shotenv.bank import build as build_module
+from shotenv.bank.build import bank_folder as bank_folder_of
 from shotenv.bank.build import build_bank, clip_jobs
 from shotenv.bank.store import (
     ARRAYS,
@@ -228,6 +229,20 @@ def test_shipped_banks_share_no_world():
         seeds[name] = {job.seed for job in clip_jobs(bank, find_config("bank", name))}
     assert not seeds["starter"] & seeds["training"]
     assert len(seeds["training"]) >= 1500
+
+
+@pytest.mark.parametrize(
+    ("change", "same"),
+    [
+        ({"sensor": {"integration_s": (1e-4, 2e-4), "offset_std_lsb": 0.0}}, True),
+        ({"sensor": {"gray_target": 0.5}}, False),
+        ({"camera": {"bounces": 3}}, False),
+        ({"seed": 1}, False),
+    ],
+)
+def test_folder_changes_with_what_the_content_depends_on(config, change, same):
+    moved = bank_folder_of(merged(config, change)) != bank_folder_of(config)
+    assert moved is not same
 
 
 def test_no_room_on_the_disk_is_said_before_rendering(config, tmp_path, monkeypatch):
