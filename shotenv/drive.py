@@ -93,12 +93,12 @@ def draw_frames(clips: Sequence[Clip], length: int, *, generator: torch.Generato
     The next clip is of the same family with probability `FAMILY_STAYS`, else of any; no clip
     follows itself where there is a choice.
     """
-    runs: list[Tensor] = []
+    frames: list[int] = []
     last: Clip | None = None
-    while sum(len(run) for run in runs) < length:
+    while len(frames) < length:
         last = _next_clip(clips, last, generator)
-        runs.append(torch.arange(last.start, last.start + last.frames))
-    return torch.cat(runs)[:length]
+        frames.extend(range(last.start, last.start + last.frames))
+    return torch.tensor(frames[:length])
 
 
 def _next_clip(clips: Sequence[Clip], last: Clip | None, generator: torch.Generator) -> Clip:

@@ -1,0 +1,130 @@
+"""One environment step against the least it could do: its normals and one atan2 over its pixels."""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+import numpy as np
+import torch
+
+from shotenv.bank.store import write_clip, write_manifest
+from shotenv.core import open_problem, reset, step
+from shotenv.resolve import env_config
+from shotenv.sensor import draw_noise
+from shotenv.vector_env import ShotScheduleVectorEnv
+from unwrap.acquisition import Shots
+from unwrap.nets import TofRegNet
+from unwrap.weights import save_weights
+
+HEIGHT, WIDTH, FRAMES = 120, 160, 16
+REPEATS = 100
+DRIVES = 16
+
+
+def run() -> list[dict]:
+    threads, cache = torch.get_num_threads(), os.environ.get("SHOTENV_CACHE")
+    torch.set_num_threads(1)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            os.environ["SHOTENV_CACHE"] = folder
+            fields = write_problem(Path(folder))
+            return [*(single(fields, shots) for shots in Shots), batched(fields)]
+    finally:
+        torch.set_num_threads(threads)
+        os.environ.pop("SHOTENV_CACHE") if cache is None else os.environ.update(SHOTENV_CACHE=cache)
+
+
+def write_problem(folder: Path) -> dict[str, object]:
+    """A bank of random light and an untrained network: the step's time depends on neither."""
+    random = np.random.default_rng(0)
+    shape = (FRAMES, HEIGHT, WIDTH)
+    distance = random.uniform(2, 20, shape).astype(np.float32)
+    active = 0.1 / distance**2
+    phase = 4 * math.pi * 24e6 / 299_792_458 * distance
+    turns = [math.pi / 2 * k for k in range(8)]
+    arrays = {
+        "correlation": np.stack([active * np.cos(phase - turn) for turn in turns], 1),
+        "active": active,
+        "ambient": random.uniform(0, 1, shape),
+        "distance_m": distance,
+    }
+    arrays = {name: values.astype(np.float32) for name, values in arrays.items()}
+    arrays["gray"] = random.integers(0, 4096, shape).astype(np.uint16)
+    numbers = [0.001] * FRAMES
+    per_frame = ("time_s", "ego_speed_m_s", "yaw_rate_rad_s", "gray_exposure_s")
+    metadata = {"name": "noise", "family": "garage", "seed": 0, "split": "train"}
+    record = write_clip(
+        folder / "bank/clips/noise", arrays, metadata | dict.fromkeys(per_frame, numbers)
+    )
+    write_manifest(folder / "bank", "bench", [record], (HEIGHT, WIDTH))
+    network = {"network": "tofregnet", "width": 4, "range_m": 30.0, "f1_hz": 24e6}
+    save_weights(folder / "net.safetensors", TofRegNet(4, 30.0), network)
+    long = {"frames_per_drive": 10_000}
+    return {"bank": str(folder / "bank"), "unwrapper": str(folder / "net.safetensors"), **long}
+
+
+def single(fields: dict[str, object], shots: Shots) -> dict:
+    problem = open_problem(env_config(**fields))
+    # A laser that never trips: every timed step does the whole work.
+    state = {"now": reset(problem, [0])}
+    action = torch.tensor([shots.action])
+    pixels = torch.randn(2, HEIGHT, WIDTH)
+
+    def play() -> None:
+        cold = state["now"].drive.start_k
+        state["now"], _ = step(problem, replace(state["now"], temperature_k=cold), action)
+
+    def least() -> None:
+        draw_noise(0, 0, shots, HEIGHT, WIDTH)
+        torch.atan2(pixels[0], pixels[1])
+
+    step_s, least_s = alternately(play, least)
+    return {
+        "name": f"step, {int(shots)} DCS / normals + atan2",
+        "ratio": step_s / least_s,
+        "goal": 3.0,
+        "holds": step_s <= 3.0 * least_s,
+        "note": f"{1e3 * step_s:.2f} ms against {1e3 * least_s:.2f} ms, 160 x 120, one thread",
+    }
+
+
+def batched(fields: dict[str, object]) -> dict:
+    fields = {**fields, "laser": {"trip_k": 2000.0, "release_k": 1999.0}}
+    one = ShotScheduleVectorEnv(1, **fields)
+    many = ShotScheduleVectorEnv(DRIVES, **fields)
+    one.reset(seed=0)
+    many.reset(seed=0)
+    actions = np.arange(DRIVES) % 3
+
+    def singly() -> None:
+        for action in actions:
+            one.step(actions[action : action + 1])
+
+    many_s, one_s = alternately(lambda: many.step(actions), singly, REPEATS // 10)
+    return {
+        "name": f"vector of {DRIVES} / {DRIVES} single steps",
+        "ratio": many_s / one_s,
+        "goal": 1.0,
+        "holds": many_s <= one_s,
+        "note": f"{1e3 * many_s / DRIVES:.2f} ms per step against {1e3 * one_s / DRIVES:.2f} ms",
+    }
+
+
+def alternately(
+    first: Callable[[], object], second: Callable[[], object], repeats: int = REPEATS
+) -> tuple[float, float]:
+    """Median seconds of both, measured in turns, so that a slow spell hits both."""
+    times: tuple[list[float], list[float]] = ([], [])
+    for _ in range(repeats):
+        for function, taken in zip((first, second), times, strict=True):
+            start = perf_counter()
+            function()
+            taken.append(perf_counter() - start)
+    return median(times[0]), median(times[1])
