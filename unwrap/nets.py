@@ -137,6 +137,26 @@ def autocast(device: torch.device) -> torch.autocast:
     return torch.autocast(device.type, torch.bfloat16, enabled=bool(supported))
 
 
+@torch.inference_mode()
+def multiply_accumulates(network: nn.Module, height: int, width: int) -> int:
+    """Multiply-accumulate operations of the convolutions of one frame of `height` x `width`."""
+    counts = []
+
+    def count(layer: nn.Module, inputs: tuple[Tensor], output: Tensor) -> None:
+        # Each weight is used once per output pixel, or per input pixel of a transposed layer.
+        pixels = inputs[0] if isinstance(layer, nn.ConvTranspose2d) else output
+        counts.append(layer.weight.numel() * pixels.shape[-2] * pixels.shape[-1])
+
+    layers = [m for m in network.modules() if isinstance(m, nn.Conv2d | nn.ConvTranspose2d)]
+    handles = [layer.register_forward_hook(count) for layer in layers]
+    try:
+        network(torch.zeros(1, 1, height, width, device=layers[0].weight.device))
+    finally:
+        for handle in handles:
+            handle.remove()
+    return sum(counts)
+
+
 class TofRegNet(Autoencoder):
     """Gray image to coarse depth in metres.
 

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import torch
 from torch import Tensor
-from torch.utils.flop_counter import FlopCounterMode
 
 from unwrap.correction import Merge, Prediction, SensorDescription, correct
 from unwrap.data import GRAY_FULL_SCALE
-from unwrap.nets import NETWORKS, Autoencoder, TofSegNet, autocast
+from unwrap.nets import NETWORKS, Autoencoder, TofSegNet, autocast, multiply_accumulates
 from unwrap.phase import unambiguous_range_m
-from unwrap.weights import build, load_weights
+from unwrap.weights import load_weights
 
 __all__ = ["Merge", "Prediction", "SensorDescription", "Unwrapper", "correct", "load_unwrapper"]
 
@@ -78,9 +77,7 @@ class Unwrapper:
 
     def macs(self, height: int, width: int) -> int:
         """Multiply-accumulate operations of one frame of `height` x `width` pixels."""
-        with torch.device("meta"), FlopCounterMode(display=False) as counter:
-            build(self.metadata).eval()(torch.empty(1, 1, height, width))
-        return counter.get_total_flops() // 2
+        return multiply_accumulates(self.network, height, width)
 
 
 def _as_float(gray: Tensor) -> Tensor:

@@ -1,0 +1,77 @@
+import pytest
+import torch
+from torch import nn
+
+from unwrap.nets import STRIDE, TofRegNet, TofSegNet, convolution, multiply_accumulates, pad
+from unwrap.weights import build
+
+
+@pytest.mark.parametrize(("height", "width"), [(32, 64), (45, 61), (33, 32), (5, 100)])
+def test_output_has_the_input_s_resolution(height, width):
+    gray = torch.rand(2, 1, height, width)
+    assert TofRegNet(4)(gray).shape == (2, height, width)
+    assert TofSegNet(4, classes=3)(gray).shape == (2, 3, height, width)
+
+
+def test_depth_is_positive_and_within_the_range():
+    depth = TofRegNet(4, range_m=12.0)(torch.rand(2, 1, 32, 32))
+    assert depth.dtype == torch.float32
+    assert 0 < depth.min() <= depth.max() < 12
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0])
+def test_black_and_white_images_give_finite_depth(level):
+    assert TofRegNet(4).eval()(torch.full((1, 1, 32, 32), level)).isfinite().all()
+
+
+def test_body_is_a_resnet18_autoencoder():
+    network = TofRegNet(64)
+    blocks = [module for stage in network.encoder for module in stage]
+    assert len(network.encoder) == 4
+    assert len(blocks) == 8
+    transposed = [m for m in network.up.modules() if isinstance(m, nn.ConvTranspose2d)]
+    plain = [m for m in network.plain.modules() if isinstance(m, nn.Conv2d)]
+    assert len(transposed) == len(plain) == 4
+    # Four stages of the published ResNet18 without its stem and classifier.
+    assert sum(p.numel() for p in network.encoder.parameters()) == 11_166_976
+
+
+def test_networks_differ_only_in_the_head():
+    names = {name for name, _ in TofRegNet(4).named_parameters()}
+    assert names == {name for name, _ in TofSegNet(4).named_parameters()}
+
+
+def test_padding_repeats_the_border():
+    gray = torch.rand(1, 1, 30, 33)
+    padded = pad(gray)
+    assert padded.shape == (1, 1, STRIDE, 2 * STRIDE)
+    assert torch.equal(padded[..., :30, :33], gray)
+    assert torch.equal(padded[..., :30, -1], gray[..., -1])
+
+
+def test_every_parameter_gets_a_gradient():
+    network = TofSegNet(4)
+    network(torch.rand(2, 1, 64, 64)).square().mean().backward()
+    dead = [name for name, p in network.named_parameters() if not p.grad.abs().sum() > 0]
+    assert dead == []
+
+
+@pytest.mark.parametrize(
+    ("metadata", "message"),
+    [
+        ({"network": "resnet", "width": 4}, "network"),
+        ({"network": "tofregnet", "width": 1_000_000, "range_m": 30}, "width"),
+        ({"network": "tofregnet", "width": "4", "range_m": 30}, "width"),
+        ({"network": "tofsegnet", "width": 4, "classes": 10**9}, "classes"),
+    ],
+)
+def test_build_refuses_impossible_networks(metadata, message):
+    with pytest.raises(ValueError, match=message):
+        build(metadata)
+
+
+def test_multiply_accumulates_of_known_layers():
+    layers = nn.Sequential(nn.Conv2d(1, 6, 3, 2, 1), nn.ConvTranspose2d(6, 5, 2, stride=2))
+    convolved, transposed = 8 * 10 * 6 * 9, 8 * 10 * 6 * 5 * 4
+    assert multiply_accumulates(layers, 16, 20) == convolved + transposed
+    assert multiply_accumulates(convolution(1, 2), 4, 4) == 16 * 2 * 9

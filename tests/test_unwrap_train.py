@@ -1,0 +1,142 @@
+import json
+import os
+import signal
+
+import pytest
+import torch
+from pydantic import ValidationError
+from safetensors.torch import load_file
+from unwrap_bank import write_bank
+
+from unwrap.data import BankFrames
+from unwrap.train import TrainConfig, TrainingModule, loss_of, train, wrap_classes, wrap_hits
+from unwrap.unwrapper import load_unwrapper
+
+SMALL = TrainConfig(width=4, epochs=2, batch_size=4)
+
+
+@pytest.fixture(scope="module")
+def bank(tmp_path_factory):
+    return write_bank(tmp_path_factory.mktemp("bank"))
+
+
+@pytest.mark.parametrize("network", ["tofregnet", "tofsegnet"])
+def test_training_writes_a_network_and_its_numbers(bank, tmp_path, network):
+    config = SMALL.model_copy(update={"network": network})
+    path = train(config, bank, tmp_path, progress=False)
+    unwrapper = load_unwrapper(path)
+    numbers = json.loads((tmp_path / f"{network}.json").read_text())
+    assert unwrapper.name == network
+    assert unwrapper.metadata["bank"] == bank.name
+    assert TrainConfig(**unwrapper.metadata["config"]) == config
+    assert 0 <= numbers["test"]["wrap_accuracy"] <= 1
+    assert set(numbers["test"]["families"]) == {"garage"}
+
+
+def test_loss_falls(bank):
+    """Thirty steps on one batch."""
+    module = TrainingModule(SMALL, steps=30)
+    frames = BankFrames(bank, "train", 30.0)
+    gray, depth_m = (torch.stack(part) for part in zip(*(frames[i] for i in range(4)), strict=True))
+    optimizer = torch.optim.Adam(module.parameters(), 1e-2)
+    losses = []
+    for _ in range(30):
+        loss = loss_of(module(gray), depth_m, SMALL)
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        losses.append(loss.item())
+    assert losses[-1] < 0.6 * losses[0]
+
+
+class InterruptedHereError(Exception):
+    pass
+
+
+def test_resumed_training_equals_uninterrupted(bank, tmp_path, monkeypatch):
+    whole = train(SMALL, bank, tmp_path / "whole", progress=False)
+    step = TrainingModule.training_step
+
+    def failing(self, batch, index):
+        if self.global_step == 3:
+            raise InterruptedHereError
+        return step(self, batch, index)
+
+    monkeypatch.setattr(TrainingModule, "training_step", failing)
+    with pytest.raises(InterruptedHereError):
+        train(SMALL, bank, tmp_path / "halves", progress=False)
+    monkeypatch.undo()
+    halves = train(SMALL, bank, tmp_path / "halves", progress=False)
+    one, other = load_file(whole), load_file(halves)
+    assert all(torch.equal(one[name], other[name]) for name in one)
+
+
+def test_interrupt_keeps_the_checkpoint(bank, tmp_path, monkeypatch):
+    step = TrainingModule.training_step
+
+    def interrupting(self, batch, index):
+        if self.global_step == 3:
+            os.kill(os.getpid(), signal.SIGINT)
+        return step(self, batch, index)
+
+    monkeypatch.setattr(TrainingModule, "training_step", interrupting)
+    handler = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        train(SMALL, bank, tmp_path, progress=False)
+    assert signal.getsignal(signal.SIGINT) is handler
+    assert [path.name for path in tmp_path.iterdir()] == ["tofregnet.ckpt"]
+
+
+def test_checkpoint_of_another_configuration_is_refused(bank, tmp_path):
+    train(SMALL, bank, tmp_path, progress=False)
+    other = SMALL.model_copy(update={"seed": 1})
+    with pytest.raises(ValueError, match="another configuration"):
+        train(other, bank, tmp_path, progress=False)
+    train(other, bank, tmp_path, resume=False, progress=False)
+
+
+def test_unusable_bank_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"manifest\.json"):
+        train(SMALL, tmp_path, tmp_path / "out", progress=False)
+
+
+def test_weights_depend_on_the_seed_alone():
+    torch.manual_seed(5)
+    one = SMALL.build().state_dict()
+    torch.manual_seed(6)
+    other = SMALL.build().state_dict()
+    assert all(torch.equal(one[name], other[name]) for name in one)
+
+
+def test_schedule_rises_then_falls_to_the_final_rate():
+    config = SMALL.model_copy(update={"warmup_share": 0.2})
+    made = TrainingModule(config, steps=100).configure_optimizers()
+    optimizer, schedule = made["optimizer"], made["lr_scheduler"]["scheduler"]
+    rates = []
+    for _ in range(101):
+        rates.append(optimizer.param_groups[0]["lr"])
+        optimizer.step()
+        schedule.step()
+    assert rates[20] == max(rates) == pytest.approx(config.learning_rate)
+    assert rates[:21] == sorted(rates[:21])
+    assert rates[20:] == sorted(rates[20:], reverse=True)
+    assert rates[-1] == pytest.approx(config.final_learning_rate)
+
+
+@pytest.mark.parametrize("wrong", [{"width": 2}, {"epochs": 0}, {"lr": 1}, {"network": "unet"}])
+def test_configuration_is_checked(wrong):
+    with pytest.raises(ValidationError, match=next(iter(wrong))):
+        TrainConfig(**wrong)
+
+
+def test_classes_are_wraps_and_the_last_is_all_beyond():
+    depth_m = torch.tensor([0.0, 6.2, 6.3, 24.9, 25.0, 30.0])
+    assert wrap_classes(depth_m, 6.2457, 5).tolist() == [0, 0, 1, 3, 4, 4]
+
+
+def test_hits_are_predictions_within_half_a_wrap():
+    truth_m = torch.tensor([3.0, 10.0, 10.0, 29.0])
+    predicted_m = truth_m + torch.tensor([3.0, -3.0, 3.3, 0.0])
+    right, scored = wrap_hits(predicted_m, truth_m, SMALL)
+    assert right.tolist() == [True, True, False, False]
+    assert scored.tolist() == [True, True, True, False]
