@@ -125,7 +125,7 @@ def read_strip(path: Path) -> Strip:
         The file is missing or damaged.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             return Strip(**{name: archive[name] for name in archive.files})
     except Exception as error:  # zipfile, zlib, numpy and missing keys each raise their own
         raise ValueError(f"{path} is missing or damaged ({error}); {CURE}") from None
