@@ -104,7 +104,7 @@ def bush(rng: np.random.Generator) -> Mesh:
     radius = rng.uniform(0.3, 0.6)
     centres = rng.uniform(-1, 1, (3, 2)) * radius
     return meshes.join(
-        meshes.blob(rng, radius * rng.uniform(0.7, 1.1), leaves, (x, y, 0.6 * radius))
+        meshes.blob(rng, radius * rng.uniform(0.7, 1.1), leaves, (x, y, 0.35 * radius))
         for x, y in centres
     )
 
