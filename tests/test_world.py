@@ -1,0 +1,344 @@
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from shotenv.config import FAMILIES, WorldConfig
+from shotenv.world import buildings, draw_world, furniture, lights, meshes, people, vehicles
+from shotenv.world import materials as m
+from shotenv.world.model import MAX_LAMPS, Mesh, Motion, Pose
+from shotenv.world.site import MAX_TRIANGLES, Site
+
+CLIP = WorldConfig()
+SPARSE = WorldConfig(frames_per_clip=3, frame_rate_hz=1.0)
+UNAMBIGUOUS_M = 6.2457
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    """Worlds of every family for two kinds of clip: (config, world) pairs."""
+    return [
+        (config, draw_world(family, seed, config))
+        for config in (CLIP, SPARSE)
+        for family in FAMILIES
+        for seed in range(6 if config is CLIP else 3)
+    ]
+
+
+def duration_s(config):
+    return config.frames_per_clip / config.frame_rate_hz
+
+
+def corners_at(world, time_s):
+    placed = [meshes.place(thing.mesh, thing.motion.at(time_s)) for thing in world.moving]
+    return np.concatenate([world.static.corners, *(mesh.corners for mesh in placed)])
+
+
+def cast(corners, origin, directions):
+    """Distances [N, F] along rays to triangles (Moeller-Trumbore), infinite where missed."""
+    a, b, c = np.moveaxis(corners.astype(np.float64), 1, 0)
+    u, v, away = b - a, c - a, origin - a
+    q = np.cross(away, u)
+    determinant = directions @ np.cross(v, u).T
+    # A parallel ray gets distance 0, which is no hit.
+    inverse = np.where(np.abs(determinant) > 1e-12, 1.0 / np.where(determinant, determinant, 1), 0)
+    s, t = directions @ np.cross(v, away).T * inverse, directions @ q.T * inverse
+    distance = (q * v).sum(-1) * inverse
+    hit = (s >= 0) & (t >= 0) & (s + t <= 1) & (distance > 1e-6)
+    return np.where(hit, distance, np.inf)
+
+
+def view(pose, columns=20, rows=15):
+    """Directions of a coarse grid of camera rays, 60 degrees across."""
+    half = np.tan(np.radians(30.0))
+    y, z = np.meshgrid(np.linspace(half, -half, columns), np.linspace(half, -half, rows) * 0.75)
+    level = np.stack([np.ones_like(y), y, z], -1).reshape(-1, 3)
+    cos, sin = np.cos(pose.yaw_rad), np.sin(pose.yaw_rad)
+    turned = level @ np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
+    return turned / np.linalg.norm(turned, axis=1, keepdims=True)
+
+
+@pytest.fixture(scope="module")
+def views(drawn):
+    """Sorted distances along coarse camera rays at the start of the dense clips, by family."""
+    result = {family: [] for family in FAMILIES}
+    for config, world in drawn:
+        if config is CLIP:
+            pose = world.ego.at(0.0)
+            hits = cast(corners_at(world, 0.0), np.array(pose.position_m), view(pose))
+            result[world.family].append(np.sort(hits, axis=1)[:, :2])
+    return {family: np.array(hits) for family, hits in result.items()}
+
+
+def digest(world):
+    """Every number of a world, hashed."""
+    parts = [world.static, *(thing.mesh for thing in world.moving)]
+    arrays = [array.tobytes() for mesh in parts for array in vars(mesh).values()]
+    rest = repr((world.light, world.ego, [thing.motion for thing in world.moving])).encode()
+    return hashlib.sha256(b"".join([*arrays, rest])).hexdigest()
+
+
+def all_digests():
+    return " ".join(digest(draw_world(family, 3, CLIP)) for family in FAMILIES)
+
+
+def test_same_arguments_same_world():
+    assert all_digests() == all_digests()
+
+
+def test_same_world_in_a_process_with_another_hash_seed():
+    told = subprocess.run(
+        [sys.executable, "-c", "import test_world; print(test_world.all_digests())"],
+        cwd=Path(__file__).parent,
+        env={**os.environ, "PYTHONHASHSEED": "7"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert told.stdout.strip() == all_digests()
+
+
+def test_seeds_and_families_differ():
+    digests = [digest(draw_world(family, seed, CLIP)) for family in FAMILIES for seed in (0, 1)]
+    assert len(set(digests)) == len(digests)
+
+
+def test_numbers_are_finite_and_in_range(drawn):
+    for _, world in drawn:
+        for mesh in (world.static, *(thing.mesh for thing in world.moving)):
+            for array in vars(mesh).values():
+                assert array.dtype == np.float32
+                assert np.isfinite(array).all()
+            assert (mesh.albedo_low >= 0).all()
+            assert (mesh.albedo_low <= mesh.albedo_high).all()
+            assert (mesh.albedo_high <= 1).all()
+            assert (mesh.retro >= 0).all()
+            assert (mesh.retro <= 1000).all()
+            assert (mesh.emission >= 0).all()
+            assert (mesh.emission <= lights.BRIGHTEST_FACE).all()
+
+
+def test_light_is_physical(drawn):
+    for _, world in drawn:
+        light = world.light
+        assert np.linalg.norm(light.sun_direction) == pytest.approx(1.0, abs=1e-9)
+        assert 0 <= light.sun_irradiance <= lights.G173_IRRADIANCE
+        assert light.sun_direction[2] >= np.sin(np.radians(15)) - 1e-9
+        assert len(light.lamps) <= MAX_LAMPS
+        for lamp in light.lamps:
+            assert lamp.intensity_w_sr > 0
+            assert np.linalg.norm(lamp.direction) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_families_have_their_light(drawn):
+    for _, world in drawn:
+        light = world.light
+        assert (light.sun_irradiance > 0) == (world.family == "sunny_road") or (
+            world.family == "tunnel"
+        )
+        if world.family == "night_road":
+            assert light.sky_zenith < 1e-3
+        if world.family in ("garage", "tunnel", "night_road"):
+            assert light.lamps
+
+
+def test_sun_falls_with_elevation():
+    elevations = np.radians([15.0, 25.0, 41.8])
+    irradiance = [lights.sun_irradiance(e) for e in elevations]
+    assert irradiance == sorted(irradiance)
+    assert irradiance[-1] == pytest.approx(lights.G173_IRRADIANCE, rel=1e-3)
+
+
+def test_triangle_budget(drawn):
+    for _, world in drawn:
+        # Ground and other things that are built rather than placed may go a little over it.
+        assert len(corners_at(world, 0.0)) <= MAX_TRIANGLES + 300
+
+
+def test_speed_is_within_the_configuration(drawn):
+    for config, world in drawn:
+        assert config.speed_m_s[0] <= world.ego.speed_m_s <= config.speed_m_s[1]
+    fast = draw_world("garage", 0, WorldConfig(speed_m_s=(12.0, 13.0)))
+    assert 12.0 <= fast.ego.speed_m_s <= 13.0
+
+
+def test_long_clips_stay_in_their_world():
+    config = WorldConfig(frames_per_clip=256)
+    for family in FAMILIES:
+        world = draw_world(family, 1, config)
+        assert world.ego.speed_m_s * duration_s(config) <= 90.0 + 1e-6
+
+
+def test_nothing_comes_near_the_camera(drawn):
+    for config, world in drawn:
+        for time in np.linspace(0.0, duration_s(config), 7):
+            corners = corners_at(world, time).astype(np.float64)
+            camera = np.array(world.ego.at(time).position_m)
+            outside = np.maximum(corners.min(axis=1) - camera, camera - corners.max(axis=1))
+            close = corners[(outside < 1.0).all(axis=1)]
+            nearest = trimesh.triangles.closest_point(close, np.tile(camera, (len(close), 1)))
+            assert np.linalg.norm(nearest - camera, axis=1).min(initial=np.inf) > 0.4
+
+
+def test_camera_starts_at_the_origin(drawn):
+    for _, world in drawn:
+        x, y, z = world.ego.start.position_m
+        assert (x, y) == (0.0, 0.0)
+        assert 0.6 <= z <= 1.2
+
+
+def test_most_worlds_have_something_moving(drawn):
+    moving = [any(thing.motion.speed_m_s > 0 for thing in world.moving) for _, world in drawn]
+    assert np.mean(moving) > 0.7
+
+
+def test_moving_things_stand_on_the_ground(drawn):
+    for config, world in drawn:
+        for thing in world.moving:
+            assert thing.mesh.corners[..., 2].min() == pytest.approx(0.0, abs=2e-3)
+            for time in (0.0, duration_s(config)):
+                above = np.add(thing.motion.at(time).position_m, (0.0, 0.0, 0.05))
+                fall = cast(world.static.corners, above, np.array([[0.0, 0.0, -1.0]])).min()
+                assert fall == pytest.approx(0.05, abs=0.015)
+
+
+ASSETS = {
+    "car": vehicles.car,
+    "cyclist": vehicles.cyclist,
+    "person": people.person,
+    "pole": furniture.pole,
+    "sign": furniture.sign,
+    "broadleaf": furniture.broadleaf,
+    "conifer": furniture.conifer,
+    "bush": furniture.bush,
+    "bollard": furniture.bollard,
+    "cone": furniture.cone,
+    "crate": furniture.crate,
+    "bin": furniture.bin_,
+    "lamp_post": lambda rng: furniture.lamp_post(rng, 6.0),
+    "hedge": lambda rng: furniture.hedge(rng, 8.0),
+    "fence": lambda rng: furniture.fence(rng, 8.0),
+    "guard_rail": lambda rng: furniture.guard_rail(rng, 12.0),
+    "jersey_barrier": lambda rng: furniture.jersey_barrier(rng, 12.0),
+    "wall": lambda rng: buildings.wall(rng, 8.0, 2.0),
+    "facade": lambda rng: buildings.facade(rng, 9.0),
+    "pillar": lambda rng: buildings.pillar(rng, 2.4),
+    "roller_door": buildings.roller_door,
+}
+
+
+@pytest.mark.parametrize("name", ASSETS)
+def test_assets_stand_on_the_ground(name):
+    rng = np.random.default_rng(5)
+    for _ in range(5):
+        corners = ASSETS[name](rng).corners
+        assert -0.6 < corners[..., 2].min() <= 1e-3
+        assert len(corners) < 1000
+        assert (np.linalg.norm(meshes.area_vectors(corners), axis=1) > 1e-9).all()
+
+
+def test_no_two_faces_fight_for_the_same_place(views):
+    for hits in views.values():
+        seen = np.isfinite(hits[..., 1])
+        apart = np.where(seen, hits[..., 1], 1.0) - np.where(seen, hits[..., 0], 0.0)
+        # Rays through an edge meet both its faces at one distance; those are few.
+        assert np.mean(apart < 1e-3) < 0.01
+
+
+def test_every_wrap_count_is_seen(views):
+    for family, hits in views.items():
+        distance = hits[..., 0]
+        for wrap in range(4):
+            inside = (distance >= wrap * UNAMBIGUOUS_M) & (distance < (wrap + 1) * UNAMBIGUOUS_M)
+            assert np.mean(inside) > 0.01, (family, wrap)
+
+
+def test_a_third_of_the_clips_are_near_field(views):
+    near = [np.mean((d[:, 0] > 0.5) & (d[:, 0] < 6.0)) for hits in views.values() for d in hits]
+    assert np.mean(np.array(near) > 0.45) > 1 / 3
+
+
+def test_first_distances_are_far_and_near(views):
+    distance = np.concatenate([hits[..., 0].ravel() for hits in views.values()])
+    scored = distance[distance < 25.0]
+    share, _ = np.histogram(scored, bins=[0.5, 1.5, 3.0, 6.0, 9.0, 12.0, 16.0, 20.0, 25.0])
+    assert (share / len(scored) > 0.005).all()
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.3, -1.2])
+def test_motion_is_the_closed_form_of_an_arc(rate):
+    start, speed, time = Pose((1.0, -2.0, 0.5), 0.4, 0.1), 7.0, 2.3
+    pose = Motion(start, speed, rate).at(time)
+    if rate:
+        radius = speed / rate
+        x = 1.0 + radius * (np.sin(0.4 + rate * time) - np.sin(0.4))
+        y = -2.0 - radius * (np.cos(0.4 + rate * time) - np.cos(0.4))
+    else:
+        x, y = 1.0 + speed * time * np.cos(0.4), -2.0 + speed * time * np.sin(0.4)
+    assert pose.position_m == pytest.approx((x, y, 0.5), abs=1e-9)
+    assert pose.yaw_rad == pytest.approx(0.4 + rate * time)
+    assert pose.pitch_rad == 0.1
+
+
+def a_box(size=(1.0, 1.0, 1.0)) -> Mesh:
+    return meshes.box(size, m.Material(0.2, 0.3))
+
+
+def test_site_keeps_the_way_and_the_ground_free():
+    site = Site(Motion(Pose((0.0, 0.0, 1.0)), 10.0), 1.0)
+    assert not site.put(a_box(), 5.0, 0.0)
+    assert site.put(a_box(), 5.0, 3.0)
+    assert not site.put(a_box(), 5.5, 3.5)
+    assert not site.move(a_box(), Motion(Pose((5.0, -6.0, 0.0), np.pi / 2), 12.0))
+    assert site.move(a_box(), Motion(Pose((5.0, -6.0, 0.0), -np.pi / 2), 12.0))
+    assert len(site.static) == 1
+    assert len(site.moving) == 1
+
+
+def test_site_lets_crowns_hang_over_and_rooms_end():
+    site = Site(Motion(Pose((0.0, 0.0, 1.0)), 0.0), 1.0)
+    post = meshes.join([a_box((0.2, 0.2, 3.0)), meshes.at(a_box((4.0, 4.0, 1.0)), 0.0, 0.0, 3.0)])
+    assert site.put(post, 2.0, 0.0)
+    assert site.put(a_box(), 3.0, 0.0)
+    site.enclose((-10.0, 8.0), (-3.0, 3.0))
+    assert not site.put(a_box(), 8.0, 0.0)
+
+
+def test_solids_have_their_volume_and_face_outwards():
+    rng = np.random.default_rng(0)
+    solids = {
+        1.0 * 2.0 * 3.0: a_box((1.0, 2.0, 3.0)),
+        0.5 * 8 * np.sin(2 * np.pi / 8) * 0.25 * 2.0: meshes.rod(
+            (0, 0, 1), (2, 0, 1), 0.5, m.SOIL.draw(rng)
+        ),
+        0.5 * 2.0: meshes.extrude([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], 2.0, m.SOIL.draw(rng)),
+    }
+    for volume, mesh in solids.items():
+        a, b, c = np.moveaxis(mesh.corners.astype(np.float64), 1, 0)
+        assert (a * np.cross(b, c)).sum() / 6 == pytest.approx(volume, rel=1e-5)
+
+
+def test_texture_has_one_scale_on_every_side_of_a_box():
+    material = m.Material(0.2, 0.3, texture_m=0.5)
+    mesh = meshes.box((1.0, 2.0, 3.0), material)
+    edges = np.linalg.norm(mesh.corners - np.roll(mesh.corners, 1, axis=1), axis=2)
+    on_texture = np.linalg.norm(mesh.uv - np.roll(mesh.uv, 1, axis=1), axis=2)
+    assert on_texture == pytest.approx(edges / 0.5, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("family", "seed", "config", "named"),
+    [
+        ("moon", 0, CLIP, "family is 'moon'"),
+        ("garage", -1, CLIP, "seed is -1"),
+        ("garage", 0, WorldConfig(speed_m_s=(10, 15), frames_per_clip=256), "speed_m_s"),
+    ],
+)
+def test_bad_arguments_are_named(family, seed, config, named):
+    with pytest.raises(ValueError, match=named):
+        draw_world(family, seed, config)
