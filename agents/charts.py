@@ -92,7 +92,7 @@ def shares_by_family(results: dict[str, Any], names: tuple[str, ...]) -> go.Figu
             )
     figure.update_xaxes(range=[0, 1], tickformat=".0%", showgrid=False, zeroline=False)
     figure.update_layout(barmode="stack", bargap=0.28, legend=LEGEND | {"traceorder": "normal"})
-    return _styled(figure, height=360)
+    return _styled(figure, height=360, left=120, top=60)
 
 
 def timeline(record: dict[str, Any], scheduler: str, fixed: str) -> go.Figure:
@@ -130,20 +130,22 @@ def timeline(record: dict[str, Any], scheduler: str, fixed: str) -> go.Figure:
     figure.update_yaxes(title="laser, °C", row=3, **AXIS)
     figure.update_xaxes(showgrid=False, zeroline=False)
     figure.update_xaxes(title="time in the drive, s", row=3)
-    figure.update_layout(hovermode="x", legend=LEGEND | {"y": 1.09})
-    return _styled(figure, height=640, top=70)
+    figure.update_layout(hovermode="x", legend=LEGEND | {"y": 1.07})
+    return _styled(figure, height=650, top=80)
 
 
 AXIS = {"gridcolor": "#e2e8f0", "zeroline": False}
 LEGEND = {"orientation": "h", "x": 1.0, "xanchor": "right", "y": 1.12, "yanchor": "bottom"}
 
 
-def _styled(figure: go.Figure, *, height: int, top: int = 60, **layout: Any) -> go.Figure:
+def _styled(
+    figure: go.Figure, *, height: int, left: int = 70, top: int = 20, **layout: Any
+) -> go.Figure:
     return figure.update_layout(
         template="none",
         font=FONT,
         height=height,
-        margin={"l": 120 if top == 60 and height == 360 else 70, "r": 30, "t": top, "b": 55},
+        margin={"l": left, "r": 30, "t": top, "b": 55},
         paper_bgcolor="rgba(0,0,0,0)",
         plot_bgcolor="rgba(0,0,0,0)",
         **layout,

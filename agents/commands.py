@@ -145,6 +145,22 @@ def unwrap_train(arguments: Namespace) -> int:
     return DONE
 
 
+def unwrap_evaluate(arguments: Namespace) -> int:
+    """Measure an unwrapping network."""
+    from agents.unwrapping import measure_unwrapping, print_unwrapping
+    from shotenv.core import open_problem
+    from shotenv.resolve import env_config
+
+    chosen = {name: arguments[name] for name in ("bank", "unwrapper", "split")}
+    problem = open_problem(env_config(**chosen))
+    frames = sum(clip.frames for clip in problem.clips)
+    with progress(frames, "unwrapping", "frame") as bar:
+        found = measure_unwrapping(problem, tick=bar.update)
+    print_unwrapping(found)
+    _write_json(arguments, found)
+    return DONE
+
+
 def _experiment(arguments: Namespace) -> DemoConfig:
     return DemoConfig(env=arguments.env, agent=arguments.agent, study=arguments.study)
 

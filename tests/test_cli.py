@@ -7,6 +7,7 @@ from agents.cli import COMMANDS, main
 from agents.doctor import Finding
 from agents.files import write_json
 from agents.results import FRAMES, RESULTS, TIMELINE, write_strip
+from shotenv.config import FAMILIES
 
 
 def run(capsys, *words):
@@ -135,12 +136,23 @@ def test_demo_does_the_main_job(capsys, tmp_path, tiny):
 
 
 def test_problem_writes_its_numbers(capsys, tmp_path, tiny):
-    words = "--env.frames_per_drive 8 --study.drives 2 --study.tuning_drives 2".split()
+    words = ("--env.frames_per_drive", 8, "--study.drives", 2, "--study.tuning_drives", 2)
     path = tmp_path / "problem.json"
     status, out, _ = run(capsys, "problem", *words, "--json", path, *tiny)
     assert status == 0 and "Clairvoyant optimum over 2 test drives" in out
     shares = json.loads(path.read_text())["optimum"]["shots_share"]
     assert sum(share["mean"] for share in shares.values()) == pytest.approx(1.0)
+
+
+def test_unwrap_evaluate_scores_every_method(capsys, tmp_path, tiny_bank, tiny_unwrapper):
+    path = tmp_path / "scores.json"
+    words = ("unwrap", "evaluate", tiny_unwrapper, "--bank", tiny_bank, "--json", path)
+    status, out, _ = run(capsys, *words)
+    found = json.loads(path.read_text())
+    assert status == 0 and "8 DCS" in out and found["frames"] == 24
+    eight, wrapped = found["methods"]["8 DCS"], found["methods"]["4 DCS wrap 0"]
+    assert eight["wrap_accuracy"] > 0.9 and eight["mae_m"] < 0.5 * wrapped["mae_m"]
+    assert set(found["families"]) == set(FAMILIES)
 
 
 def test_doctor_exits_by_what_it_finds(capsys, monkeypatch, tmp_path):

@@ -87,10 +87,12 @@ def test_infos_are_split_by_their_masks():
 def test_training_learns_and_keeps_the_best_policy(tmp_path):
     returns = []
     config = CONFIG.model_copy(update={"total_steps": 1536, "learning_rate": 1e-2})
-    trainer = make_trainer(
-        tmp_path, check=lambda policy: returns.append(validate(policy)) or returns[-1], config=config
-    )
-    best = trainer.run()
+
+    def check(policy):
+        returns.append(validate(policy))
+        return returns[-1]
+
+    best = make_trainer(tmp_path, check=check, config=config).run()
     assert validate(best) == max(returns) > 0.9
     assert {path.name for path in tmp_path.iterdir()} == {
         *(CHECKPOINT, "policy.safetensors", "agent.json")
