@@ -58,7 +58,7 @@ class TrainConfig(BaseModel):
     clamp_m: float = Field(30.0, gt=0, description="truth beyond, and the sky, counts as this, m")
     epochs: int = Field(40, ge=1, description="passes over the training frames")
     batch_size: int = Field(32, ge=1, description="frames per step")
-    learning_rate: float = Field(1e-3, gt=0, description="highest learning rate")
+    learning_rate: float = Field(3e-3, gt=0, description="highest learning rate")
     final_learning_rate: float = Field(1e-6, ge=0, description="learning rate at the last step")
     warmup_share: float = Field(0.1, ge=0, lt=1, description="share of steps that rise linearly")
     weight_decay: float = Field(0.01, ge=0, description="decoupled decay; 0 is plain Adam")
