@@ -14,7 +14,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from shotenv.batch import put, take
-from shotenv.core import Outcome, State, observe, reset, step
+from shotenv.core import State, observe, reset, step
 from shotenv.draw import draw_frame
 from shotenv.env import (
     ACTIONS,
@@ -70,7 +70,7 @@ class ShotScheduleVectorEnv(VectorEnv):
         self.state: State | None = None
         self._generators = [seeding.np_random()[0] for _ in range(num_envs)]
         self._over = np.zeros(num_envs, dtype=bool)
-        self._shown: list[tuple[State, int]] = []
+        self._shown: dict[int, tuple[State, int]] = {}
 
     def reset(
         self,
@@ -89,8 +89,8 @@ class ShotScheduleVectorEnv(VectorEnv):
         for row, value in enumerate(self._check_seeds(seed)):
             if value is not None and row in rows:
                 self._generators[row] = seeding.np_random(value)[0]
-        infos = self._restart(rows, {})
-        return self._observations(), infos
+        told = self._restart(rows)
+        return self._observations(), self._batched(told)
 
     def step(
         self, actions: np.ndarray
@@ -109,74 +109,64 @@ class ShotScheduleVectorEnv(VectorEnv):
             self.autoreset_mode == AutoresetMode.DISABLED and any(self._over)
         ):
             raise gymnasium.error.ResetNeeded("a drive is not under way; call reset() first")
-        infos: dict[str, Any] = {}
-        rewards, resting = np.zeros(self.num_envs), self._over.copy()
-        played = np.flatnonzero(~resting)
-        if len(played):
-            rewards[played] = self._play(played, chosen, infos)
+        resting, rewards = self._over.copy(), np.zeros(self.num_envs)
+        told, rewards[~resting] = self._play(np.flatnonzero(~resting), chosen)
         truncated = self._over & ~resting
-        if resting.any():
-            self._restart(np.flatnonzero(resting), infos)
-        if self.autoreset_mode == AutoresetMode.SAME_STEP and truncated.any():
-            infos = self._finish(np.flatnonzero(truncated), infos)
+        restarted = resting
+        if self.autoreset_mode == AutoresetMode.SAME_STEP:
+            restarted, last = truncated, self._observations()
+            for row in np.flatnonzero(truncated):
+                told[row] = {"final_obs": last[row], "final_info": told[row]}
+        for row, info in self._restart(np.flatnonzero(restarted)).items():
+            told[row] = told.get(row, {}) | info
         none = np.zeros(self.num_envs, dtype=bool)
-        return self._observations(), rewards, none, truncated, infos
+        return self._observations(), rewards, none, truncated, self._batched(told)
 
-    def _play(self, rows: np.ndarray, actions: torch.Tensor, infos: dict[str, Any]) -> np.ndarray:
-        """Play one frame of the drives `rows`; returns their rewards."""
+    def _play(
+        self, rows: np.ndarray, actions: torch.Tensor
+    ) -> tuple[dict[int, dict[str, Any]], np.ndarray]:
+        """Play one frame of the drives `rows`: their infos by row, and their rewards."""
+        if not len(rows):
+            return {}, np.zeros(0)
         index, before = torch.from_numpy(rows), self.state
         whole = len(rows) == self.num_envs
         part = before if whole else take(before, index)
         after, outcome = step(self.problem, part, actions[index])
         self.state = after if whole else put(before, index, after)
         self._over[rows] = outcome.truncated.numpy()
-        self._remember(rows, part, outcome)
-        told = step_infos(self.problem, part, after, outcome)
-        for row, info in zip(rows, told, strict=True):
-            infos.update(self._add_info(infos, info, row))
-        return outcome.reward.numpy()
+        self._show(rows, part, outcome.shots.tolist())
+        infos = step_infos(self.problem, part, after, outcome)
+        return dict(zip(rows.tolist(), infos, strict=True)), outcome.reward.numpy()
 
-    def _remember(self, rows: np.ndarray, part: State, outcome: Outcome) -> None:
-        if self.render_mode is not None:
-            for place, (row, shots) in enumerate(zip(rows, outcome.shots.tolist(), strict=True)):
-                self._shown[row] = take(part, torch.tensor([place])), shots
-
-    def _restart(self, rows: np.ndarray, infos: dict[str, Any]) -> dict[str, Any]:
-        """Start new drives in `rows` and tell of them in `infos`."""
+    def _restart(self, rows: np.ndarray) -> dict[int, dict[str, Any]]:
+        """Start new drives in `rows`: their infos by row."""
+        if not len(rows):
+            return {}
         fresh = reset(self.problem, [drive_seed(self._generators[row]) for row in rows])
-        whole = self.state is None or len(rows) == self.num_envs
+        whole = len(rows) == self.num_envs
         self.state = fresh if whole else put(self.state, torch.from_numpy(rows), fresh)
         self._over[rows] = False
+        self._show(rows, fresh, [0] * len(rows))
+        infos = reset_infos(self.problem, fresh)
+        return dict(zip(rows.tolist(), infos, strict=True))
+
+    def _show(self, rows: np.ndarray, part: State, shots: list[int]) -> None:
+        """Remember what `render` would draw."""
         if self.render_mode is not None:
-            self._shown = self._shown or [(fresh, 0)] * self.num_envs
-            for place, row in enumerate(rows):
-                self._shown[row] = take(fresh, torch.tensor([place])), 0
-        for row, info in zip(rows, reset_infos(self.problem, fresh), strict=True):
-            infos.update(self._add_info(infos, info, row))
+            for place, row in enumerate(rows.tolist()):
+                self._shown[row] = take(part, torch.tensor([place])), shots[place]
+
+    def _batched(self, told: dict[int, dict[str, Any]]) -> dict[str, Any]:
+        infos: dict[str, Any] = {}
+        for row in sorted(told):
+            infos = self._add_info(infos, told[row], row)
         return infos
-
-    def _finish(self, rows: np.ndarray, infos: dict[str, Any]) -> dict[str, Any]:
-        """Restart drives in the step that ended them; their last words go to `final_*`."""
-        last = self._observations()
-        final: dict[str, Any] = {}
-        for row in rows:
-            words = {"final_obs": last[row], "final_info": self._info_of(infos, row)}
-            final = self._add_info(final, words, row)
-        return self._restart(rows, {**infos, **final})
-
-    def _info_of(self, infos: dict[str, Any], row: int) -> dict[str, Any]:
-        """Info of one environment, out of the batch's."""
-        return {
-            key: self._info_of(value, row) if isinstance(value, dict) else value[row]
-            for key, value in infos.items()
-            if not key.startswith("_")
-        }
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Pictures of the last frames; None without a render mode."""
         if self.render_mode is None:
             return None
-        return tuple(draw_frame(self.problem, *shown) for shown in self._shown)
+        return tuple(draw_frame(self.problem, *self._shown[row]) for row in range(self.num_envs))
 
     def _observations(self) -> np.ndarray:
         return observe(self.problem, self.state).numpy()

@@ -32,6 +32,12 @@ AMBIENT_IRRADIANCE_W_M2 = {
 }
 
 
+@pytest.fixture(autouse=True, scope="session")
+def _one_thread():
+    """Tensors here are small: threads would only wait for each other."""
+    torch.set_num_threads(1)
+
+
 @pytest.fixture(scope="session")
 def sensor() -> SensorConfig:
     return read_config(SensorConfig, find_config("sensor", "epc660"))

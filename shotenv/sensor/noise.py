@@ -24,7 +24,7 @@ def stream_seed(purpose: Purpose, *words: int) -> int:
 
     Neighbouring words give unrelated seeds, which a plain sum would not.
     """
-    state = int(purpose)
+    state = _mix(int(purpose))
     for word in words:
         state = _mix(state ^ (int(word) & _MASK))
     return state >> 1

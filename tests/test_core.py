@@ -1,0 +1,202 @@
+"""The transition: batches, reward, heat, and the table of all outcomes."""
+
+from __future__ import annotations
+
+import dataclasses
+from itertools import pairwise
+
+import pytest
+import torch
+
+from shotenv.batch import concatenate, put, take
+from shotenv.config import RewardConfig
+from shotenv.core import observe, open_problem, outcomes_of_all_actions, reset, step
+from shotenv.drive import draw_frames
+from shotenv.frames import ShotCost
+from shotenv.observe import FEATURES, LIMIT
+from shotenv.predictions import keep_predictions
+from shotenv.resolve import env_config
+from shotenv.reward import TERMS, frame_sum, no_depth, reward, reward_terms, score_depth
+from unwrap.unwrapper import load_unwrapper
+
+
+@pytest.fixture(scope="module")
+def problem(tiny_kwargs, session_cache):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SHOTENV_CACHE", session_cache)
+        return open_problem(env_config(**tiny_kwargs, split="all"))
+
+
+def score(distance, valid, truth, scored, scale=0.5):
+    return score_depth(
+        torch.tensor([[distance]]),
+        torch.tensor([[valid]]),
+        torch.tensor([[truth]]),
+        torch.tensor([[scored]]),
+        error_scale_m=scale,
+        unambiguous_m=6.25,
+        range_m=25.0,
+    )
+
+
+def test_score_by_hand():
+    nan, inf = float("nan"), float("inf")
+    found = score(
+        [2.5, 9.0, 3.0, nan, 1.0],
+        [True, True, False, False, True],
+        [2.0, 2.0, 3.0, 4.0, inf],
+        [True, True, True, True, False],
+    )
+    assert found.error.item() == pytest.approx((0.5 + 7 / 7.5 + 1 + 1) / 4)
+    assert found.depth_mae_m.item() == pytest.approx((0.5 + 7) / 2)
+    assert found.depth_rmse_m.item() == pytest.approx(((0.25 + 49) / 2) ** 0.5)
+    assert found.wrap_accuracy.item() == pytest.approx(1 / 4)
+    assert found.valid_share.item() == pytest.approx(2 / 4)
+
+
+def test_a_frame_without_scored_pixels_costs_nobody_anything():
+    found = score([1.0, 2.0], [True, False], [9.0, 9.0], [False, False])
+    assert found.error.item() == 0.0 and found.valid_share.item() == 1.0
+
+
+def test_reward_is_minus_the_weighted_terms():
+    one = torch.ones(1, dtype=torch.float64)
+    cost = ShotCost(1 * one, 2 * one, 0.02 * one, 1 * one)
+    eight = ShotCost(4 * one, 5 * one, 0.08 * one, 4 * one)
+    terms = reward_terms(no_depth(1, 25.0), cost, eight, torch.tensor([True]))
+    assert {name: value.item() for name, value in terms.items()} == {
+        "error": 1.0,
+        "duty": 0.25,
+        "power": 0.4,
+        "tripped": 1.0,
+    }
+    weights = RewardConfig(error=2.0, duty=0.4, power=0.5, trip=0.3)
+    assert reward(terms, weights).item() == pytest.approx(-(2.0 + 0.1 + 0.2 + 0.3))
+
+
+def test_sums_are_the_same_on_any_number_of_threads():
+    maps = torch.rand(3, 240, 320, generator=torch.Generator().manual_seed(0))
+    threads = torch.get_num_threads()
+    sums = []
+    for count in (1, 2):
+        torch.set_num_threads(count)
+        sums += [frame_sum(maps), torch.cat([frame_sum(one[None]) for one in maps])]
+    torch.set_num_threads(threads)
+    assert all(torch.equal(sums[0], other) for other in sums)
+
+
+def test_rows_of_nested_values():
+    state = ShotCost(*(torch.arange(4.0) + 10 * i for i in range(4)))
+    rows = torch.tensor([3, 1])
+    part = take(state, rows)
+    assert part.duty.tolist() == [23.0, 21.0]
+    changed = put(state, rows, ShotCost(*(torch.zeros(2) for _ in range(4))))
+    assert changed.heat_j.tolist() == [30.0, 0.0, 32.0, 0.0]
+    assert state.heat_j.tolist() == [30.0, 31.0, 32.0, 33.0]
+    assert concatenate([part, part]).energy_j.tolist() == [13.0, 11.0] * 2
+
+
+def test_a_drive_plays_whole_clips_of_its_split(problem):
+    clips = problem.bank.splits("train")
+    frames = draw_frames(clips, 101, generator=torch.Generator().manual_seed(0)).tolist()
+    assert len(frames) == 101
+    order = []
+    for start in range(0, 100, 4):
+        run = frames[start : start + 4]
+        assert run == list(range(run[0], run[0] + len(run)))
+        order.append(problem.bank.clip_of(run[0]))
+    assert all(clip.split == "train" for clip in order)
+    assert all(a is not b for a, b in pairwise(order))
+    assert len({clip.name for clip in order}) == len(clips)
+
+
+def rows_equal(one, many, row):
+    for field in dataclasses.fields(one):
+        left, right = getattr(one, field.name), getattr(many, field.name)
+        if dataclasses.is_dataclass(left):
+            rows_equal(left, right, row)
+        elif isinstance(left, dict):
+            assert all(torch.equal(left[k][0], right[k][row]) for k in left), field.name
+        else:
+            assert torch.equal(left[0], right[row]), field.name
+
+
+def test_an_environment_in_a_batch_equals_the_one_alone(problem):
+    seeds, actions = [11, 12, 13, 14, 15], torch.tensor([[0, 1, 2, 2, 0], [2, 2, 1, 0, 0]])
+    many, alone = reset(problem, seeds), [reset(problem, [seed]) for seed in seeds]
+    for chosen in actions:
+        many, outcome = step(problem, many, chosen)
+        for row in range(len(seeds)):
+            alone[row], single = step(problem, alone[row], chosen[row : row + 1])
+            rows_equal(single, outcome, row)
+            rows_equal(alone[row], many, row)
+            assert torch.equal(observe(problem, alone[row])[0], observe(problem, many)[row])
+
+
+def test_the_table_holds_what_each_step_pays(problem):
+    start = reset(problem, [21])
+    table = outcomes_of_all_actions(problem, start.drive)
+    state, actions = start, [2, 0, 1, 1, 2, 0]
+    for frame, action in enumerate(actions):
+        before = state
+        state, outcome = step(problem, state, torch.tensor([action]))
+        assert not bool(before.tripped)
+        assert outcome.reward.item() == table.reward[frame, action].item()
+        assert outcome.cost.heat_j.item() == table.heat_j[frame, action].item()
+        assert outcome.score.error.item() == table.terms["error"][frame, action].item()
+    assert set(table.terms) == set(TERMS)
+
+
+def test_a_hot_laser_trips_delivers_nothing_and_comes_back(tiny_kwargs):
+    fragile = {"trip_k": 311.5, "release_k": 311.0, "thermal_time_constant_s": 0.5}
+    problem = open_problem(env_config(**tiny_kwargs, laser=fragile))
+    state, table_reward = reset(problem, [1]), None
+    tripped, shots = [], []
+    for _ in range(32):
+        state, outcome = step(problem, state, torch.tensor([2]))
+        tripped.append(bool(outcome.tripped))
+        shots.append(int(outcome.shots))
+        if outcome.tripped:
+            table_reward = outcome.reward.item()
+            assert outcome.terms["error"].item() == 1.0
+            assert outcome.score.valid_share.item() == 0.0
+            assert outcome.cost.laser_energy_j.item() == 0.0
+    assert not tripped[0] and any(tripped)
+    assert [s == 0 for s in shots] == tripped
+    # It came back at least once.
+    assert any(a and not b for a, b in pairwise(tripped))
+    table = outcomes_of_all_actions(problem, state.drive)
+    assert table_reward == table.tripped_reward
+
+
+def test_observations_stay_in_their_box_and_follow_the_state(problem):
+    state = reset(problem, [31, 32])
+    names = list(FEATURES)
+    first = observe(problem, state)
+    assert first[:, names.index("time_left")].tolist() == [1.0, 1.0]
+    assert first[:, names.index("last_eight")].tolist() == [0.0, 0.0]
+    state, _ = step(problem, state, torch.tensor([2, 0]))
+    second = observe(problem, state)
+    assert second[:, names.index("last_eight")].tolist() == [1.0, 0.0]
+    assert second[:, names.index("since_eight")][0] == 0.0
+    assert second[:, names.index("since_eight")][1] > 0.9
+    assert second[0, names.index("disagreement")] > 0.0
+    assert second[1, names.index("disagreement")] == 0.0
+    assert torch.isfinite(second).all() and second.abs().max() <= LIMIT
+
+
+def test_predictions_are_kept_and_damage_is_mended(problem, tiny_kwargs, tmp_path, monkeypatch):
+    monkeypatch.setenv("SHOTENV_CACHE", str(tmp_path))
+    unwrapper = load_unwrapper(tiny_kwargs["unwrapper"])
+    kept = keep_predictions(problem.bank, unwrapper)
+    direct = unwrapper.predict(problem.bank.gray(torch.tensor([5])))
+    assert (kept.of(torch.tensor([5])).distance_m - direct.distance_m).abs().max() < 0.02
+    (file,) = tmp_path.glob("predictions/*/distance_m.npy")
+    changed, before = file.stat().st_mtime_ns, kept.distance_m.clone()
+    keep_predictions(problem.bank, unwrapper)
+    assert file.stat().st_mtime_ns == changed
+    content = file.read_bytes()
+    file.write_bytes(content[:-2] + b"\x00\x7c")
+    again = keep_predictions(problem.bank, unwrapper)
+    assert file.read_bytes() == content
+    assert torch.equal(again.distance_m, before)
