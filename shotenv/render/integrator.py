@@ -112,7 +112,7 @@ def _follow(
     """Walk every lane's path from the camera, adding the light of each surface hit."""
     eye, passive, instant = lights.eye, lights.passive, lanes.instant
     origin, direction = eye.rays(lanes, sampler.next_2d())
-    hit = scene.hit(origin, direction, instant, mi.Bool(True))
+    hit = scene.hit(origin, direction, instant, mi.Bool(True), coherent=True)
     seen = dr.select(hit.valid, hit.emission, passive.sky(direction))
     light = _Light(
         distance_m=dr.select(hit.valid, hit.distance_m, dr.inf),

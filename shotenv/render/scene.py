@@ -54,11 +54,13 @@ class Scene:
         self._static_faces = dr.opaque(mi.UInt32, len(geometry.static))
         self._moving_faces = dr.opaque(mi.UInt32, len(geometry.moving) // len(geometry.tile_m))
 
-    def hit(self, origin, direction, instant, active) -> Hit:
-        """Nearest surface along each ray, within `REACH_M`."""
+    def hit(self, origin, direction, instant, active, coherent: bool = False) -> Hit:
+        """Nearest surface along each ray, within `REACH_M`; neighbouring rays may be alike."""
         tile = dr.gather(mi.Vector3f, self._tile, instant, active)
-        still = self._nearest(self._static, origin, direction, active)
-        moved = self._nearest(self._moving, origin + tile, direction, active)
+        ray = _ray(origin, direction, mi.Float(REACH_M))
+        still = self._static.ray_intersect_preliminary(ray, coherent, active)
+        ray = _ray(origin + tile, direction, dr.minimum(still.t, REACH_M))
+        moved = self._moving.ray_intersect_preliminary(ray, coherent, active)
         moves = moved.t < still.t
         nearest = dr.minimum(still.t, moved.t)
         valid = active & (nearest < REACH_M)
@@ -90,10 +92,6 @@ class Scene:
         blocked = self._static.ray_test(_ray(origin, direction, length), False, active)
         free = active & ~blocked
         return free & ~self._moving.ray_test(_ray(origin + tile, direction, length), False, free)
-
-    def _nearest(self, scene, origin, direction, active):
-        ray = _ray(origin, direction, mi.Float(REACH_M))
-        return scene.ray_intersect_preliminary(ray, False, active)
 
     def _noise_at(self, face, corner_weight, active):
         first = dr.gather(mi.Vector4f, self._uv, 2 * face, active)
