@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
-from time import perf_counter
+from time import thread_time
 
 import numpy as np
 import torch
@@ -120,11 +120,11 @@ def batched(fields: dict[str, object]) -> dict:
 def alternately(
     first: Callable[[], object], second: Callable[[], object], repeats: int = REPEATS
 ) -> tuple[float, float]:
-    """Median seconds of both, measured in turns, so that a slow spell hits both."""
+    """Median processor seconds of both, measured in turns, so that a slow spell hits both."""
     times: tuple[list[float], list[float]] = ([], [])
     for _ in range(repeats):
         for function, taken in zip((first, second), times, strict=True):
-            start = perf_counter()
+            start = thread_time()
             function()
-            taken.append(perf_counter() - start)
+            taken.append(thread_time() - start)
     return median(times[0]), median(times[1])

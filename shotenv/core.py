@@ -109,6 +109,7 @@ class Outcome:
     truncated: Tensor
 
 
+@torch.inference_mode()
 def reset(problem: Problem, seeds: Sequence[int]) -> State:
     """Start of the drives with the given seeds, one for each environment of the batch."""
     bank = problem.bank
@@ -132,6 +133,7 @@ def reset(problem: Problem, seeds: Sequence[int]) -> State:
     )
 
 
+@torch.inference_mode()
 def step(problem: Problem, state: State, actions: Tensor) -> tuple[State, Outcome]:
     """Play one frame of every drive.
 
@@ -214,6 +216,7 @@ def advance(problem: Problem, state: State, cost: ShotCost, seen: Seen) -> State
     return State(state.drive, state.step + 1, temperature_k, tripped, seen)
 
 
+@torch.inference_mode()
 def observe(problem: Problem, state: State) -> Tensor:
     """Features float32 [B, len(FEATURES)] in [-LIMIT, LIMIT], in the order of `FEATURES`."""
     drive, seen, laser = state.drive, state.seen, problem.config.laser
@@ -265,6 +268,7 @@ class Outcomes:
     tripped_reward: float
 
 
+@torch.inference_mode()
 def outcomes_of_all_actions(problem: Problem, drive: Drive) -> Outcomes:
     """Play every action in every frame of `drive` (a batch of one), without its consequences."""
     steps = torch.arange(problem.config.frames_per_drive)

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from shotenv.drive import Drive
 from shotenv.problem import Problem
-from shotenv.reward import DepthScore, frame_sum, score_depth
+from shotenv.reward import DepthScore, frame_sums, score_depth
 from shotenv.sensor import (
     Electrons,
     acquire,
@@ -34,8 +34,8 @@ class Acquisition:
         Samples and corrected depth.
     prediction_m, noise_lsb, truth_m : float32 [B, H, W]
         The network's coarse distance, the sensor's own estimate of a sample's noise, the truth.
-    scored : bool [B, H, W]
-        Pixels that count.
+    scored : float32 [B, H, W]
+        1 where the pixel counts, else 0.
     """
 
     raw: RawFrame
@@ -101,10 +101,11 @@ def acquire_depth(
 
 
 def scored_pixels(electrons: Electrons, truth_m: Tensor, problem: Problem) -> Tensor:
-    """Pixels that count: truth within the range, single-sample signal to noise large enough."""
+    """Pixels that count, 1 or 0: truth within the range, single-sample signal to noise enough."""
     sensor = problem.config.sensor
-    strong = single_sample_snr(electrons, sensor) > sensor.min_snr
-    return strong.logical_and_(truth_m <= sensor.max_range_m)
+    strong = single_sample_snr(electrons, sensor).gt_(sensor.min_snr)
+    # In place a comparison stays float32, which is vectorised; a bool result is not.
+    return truth_m.clone().le_(sensor.max_range_m).mul_(strong)
 
 
 def measure(
@@ -129,23 +130,21 @@ def seen_by_sensor(made: Acquisition, shots: Shots) -> Tensor:
     four_sigma = 4.0 * made.noise_lsb
     amplitude, residual = made.depth.amplitude, made.depth.residual
     pixels = amplitude.shape[1] * amplitude.shape[2]
-    nothing = torch.zeros(len(amplitude), dtype=torch.float64)
     valid = made.depth.valid.to(amplitude.dtype)
-    valid_count = frame_sum(valid)
-    disagreement = nothing
+    maps = [amplitude, _bounded(amplitude, four_sigma), valid]
+    maps.append(made.raw.saturated.to(amplitude.dtype))
+    if residual is not None:
+        maps.append(_bounded(residual, four_sigma))
     if shots == Shots.EIGHT:
         apart_m = (made.depth.distance_m - made.prediction_m).abs_()
-        apart = frame_sum(_bounded(apart_m, torch.ones_like(apart_m)) * valid)
-        disagreement = apart / valid_count.clamp(min=1)
-    columns = (
-        (frame_sum(amplitude) / pixels).log1p() / 6.9,
-        frame_sum(_bounded(amplitude, four_sigma)) / pixels,
-        valid_count / pixels,
-        frame_sum(made.raw.saturated.to(amplitude.dtype)) / pixels,
-        nothing if residual is None else frame_sum(_bounded(residual, four_sigma)) / pixels,
-        disagreement,
-    )
-    return torch.stack(columns, dim=1).to(torch.float32)
+        maps.append((apart_m / (apart_m + 1.0)).mul_(valid))
+    sums = frame_sums(*maps)
+    seen = torch.zeros(6, sums.shape[1], dtype=sums.dtype)
+    torch.div(sums, pixels, out=seen[: len(sums)])
+    seen[0].log1p_().div_(6.9)
+    if shots == Shots.EIGHT:
+        seen[5] = sums[5] / sums[2].clamp(min=1)
+    return seen.T.to(torch.float32)
 
 
 def _bounded(value: Tensor, scale: Tensor) -> Tensor:

@@ -11,7 +11,7 @@ from torch import Tensor
 from shotenv.bank import Bank, Clip
 from shotenv.config import SensorConfig
 from shotenv.predictions import KeptPredictions
-from shotenv.reward import frame_sum
+from shotenv.reward import frame_sums
 from shotenv.sensor import electrons_per_radiance_second
 from shotenv.sensor.converter import full_scale_lsb
 from shotenv.sensor.gray import gray_gain_lsb_per_e
@@ -115,7 +115,7 @@ def _scene(
 
 
 def _mean(maps: Tensor) -> Tensor:
-    return frame_sum(maps) / (maps.shape[1] * maps.shape[2])
+    return frame_sums(maps)[0] / (maps.shape[1] * maps.shape[2])
 
 
 def _log_ambient(gray: Tensor, exposure_s: Tensor, sensor: SensorConfig) -> Tensor:

@@ -41,13 +41,17 @@ class DepthScore:
     valid_share: Tensor
 
 
-def frame_sum(values: Tensor) -> Tensor:
-    """Sum of each frame [B] of [B, H, W], float64.
+def frame_sums(*maps: Tensor) -> Tensor:
+    """Sum of each frame of each of the maps [B, H, W], float64 [len(maps), B].
 
     Row by row, because a sum over a whole frame at once is split among threads, and then its
     last bit depends on how many there are.
     """
-    return values.sum(dim=-1).to(torch.float64).sum(dim=-1)
+    return torch.stack([values.sum(dim=-1) for values in maps]).to(torch.float64).sum(dim=-1)
+
+
+FARTHEST_ERROR_M = 1e4
+"""Stands for the error where distance or truth is not finite; no such pixel is scored and valid."""
 
 
 def score_depth(
@@ -60,25 +64,35 @@ def score_depth(
     unambiguous_m: float,
     range_m: float,
 ) -> DepthScore:
-    """Score depth [B, H, W] against the truth over the pixels `scored`."""
+    """Score depth [B, H, W] against the truth over the pixels `scored`.
+
+    `valid` and `scored` are bool, or float with 0 and 1 (float masks are several times faster).
+    """
     counted = scored.to(distance_m.dtype)
-    good = counted * valid
-    # NaN and infinity outside the good pixels must not spread through a product with zero.
-    error_m = torch.where(good > 0, distance_m - truth_m, 0.0).abs_()
-    bounded = error_m / (error_m + error_scale_m)
-    scored_count, good_count = frame_sum(counted), frame_sum(good)
-    right_count = frame_sum(good * (error_m < 0.5 * unambiguous_m))
-    nothing, any_good = scored_count == 0, good_count > 0
-    scored_count, good_divisor = scored_count.clamp(min=1), good_count.clamp(min=1)
-    invalid_count = scored_count - good_count
-    error = (frame_sum(bounded) + invalid_count) / scored_count
-    mae_m, mse_m2 = frame_sum(error_m) / good_divisor, frame_sum(error_m**2) / good_divisor
+    good = valid.to(distance_m.dtype).mul_(counted)
+    error_m = (distance_m - truth_m).abs_()
+    error_m = error_m.nan_to_num_(FARTHEST_ERROR_M, FARTHEST_ERROR_M)
+    good_error_m = error_m * good
+    sums = frame_sums(
+        counted,
+        good,
+        good_error_m / (error_m + error_scale_m),
+        good_error_m,
+        error_m.mul(good_error_m),
+        error_m.lt_(0.5 * unambiguous_m).mul_(good),
+    )
+    scored_count, good_count, bounded, absolute_m, squared_m2, right_count = sums
+    nothing, none_good = scored_count == 0, good_count == 0
+    divisor, good_divisor = scored_count.clamp(min=1), good_count.clamp(min=1)
+    shares = torch.stack((good_count, right_count)) / divisor
+    valid_share, wrap_accuracy = shares.masked_fill_(nothing, 1.0)
+    error = (bounded + scored_count - good_count) / divisor
     return DepthScore(
-        error=torch.where(nothing, 0.0, error),
-        depth_mae_m=torch.where(any_good, mae_m, range_m),
-        depth_rmse_m=torch.where(any_good, mse_m2.sqrt(), range_m),
-        wrap_accuracy=torch.where(nothing, 1.0, right_count / scored_count),
-        valid_share=torch.where(nothing, 1.0, good_count / scored_count),
+        error=error,
+        depth_mae_m=(absolute_m / good_divisor).masked_fill_(none_good, range_m),
+        depth_rmse_m=(squared_m2 / good_divisor).sqrt_().masked_fill_(none_good, range_m),
+        wrap_accuracy=wrap_accuracy,
+        valid_share=valid_share,
     )
 
 

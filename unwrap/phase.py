@@ -69,7 +69,8 @@ def decode(dcs: Tensor, *, offset_lsb: Tensor | None = None) -> PhaseFrame:
 def _phase(sine: Tensor, cosine: Tensor) -> Tensor:
     """atan2 in [0, 2 pi); the clamp catches angles so little below 0 that adding 2 pi rounds up."""
     phase = torch.atan2(sine, cosine)
-    return torch.where(phase < 0, phase + TWO_PI, phase).clamp_(max=BELOW_TWO_PI)
+    turns = phase.mul(1 / TWO_PI).floor_()
+    return phase.add_(turns, alpha=-TWO_PI).clamp_(max=BELOW_TWO_PI)
 
 
 def _hypot(a: Tensor, b: Tensor) -> Tensor:

@@ -135,7 +135,7 @@ def _saturated(fullest_e: Tensor, dcs_lsb: Tensor, sensor: SensorConfig) -> Tens
     beyond = fullest_e.sub(sensor.full_well_e)
     torch.maximum(beyond, dcs_lsb.amax(dim=1).sub_(high), out=beyond)
     torch.maximum(beyond, dcs_lsb.amin(dim=1).neg_().add_(low), out=beyond)
-    return beyond >= 0
+    return beyond.ge_(0.0).bool()
 
 
 def fixed_pattern_lsb(

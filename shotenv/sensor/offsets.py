@@ -54,6 +54,6 @@ def ambient_offset_lsb(ambient_e: Tensor, sensor: SensorConfig) -> Tensor:
     ambient alone fills a tap, and no more.
     """
     filled = (0.5 / sensor.full_well_e * ambient_e).clamp_(max=1.0)
-    parity = torch.ones(ambient_e.shape[-2], 1, dtype=ambient_e.dtype, device=ambient_e.device)
-    parity[1::2] = -1.0
-    return filled.mul_(sensor.offset_ambient_lsb * parity)
+    filled[:, 0::2] *= sensor.offset_ambient_lsb
+    filled[:, 1::2] *= -sensor.offset_ambient_lsb
+    return filled
