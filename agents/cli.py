@@ -6,6 +6,7 @@ Exit status: 0 done; 1 what was asked for failed, with one sentence on stderr; 2
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -43,7 +44,10 @@ class Command:
     def parser(self) -> ArgumentParser:
         """Parser of the command's own arguments."""
         parser = ArgumentParser(
-            prog=f"shotenv {self.words}", description=self.help, exit_on_error=False
+            prog=f"shotenv {self.words}",
+            description=self.help,
+            exit_on_error=False,
+            allow_abbrev=False,
         )
         self.arguments(parser)
         return parser
@@ -56,8 +60,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _run(words)
     except SystemExit as leaving:  # argparse, after --help or --print_config
         return DONE if leaving.code in (None, 0) else WRONG_USAGE
-    except (ArgumentError, ConfigError) as error:
-        return _refuse(one_sentence(error), WRONG_USAGE)
+    except ConfigError as error:
+        return _refuse(str(error), WRONG_USAGE)
     except KeyboardInterrupt:
         return _refuse("interrupted; the same command continues where it stopped", INTERRUPTED)
     except BrokenPipeError:
@@ -85,10 +89,35 @@ def _run(words: list[str]) -> int:
     for command in COMMANDS:
         own = command.words.split()
         if words[: len(own)] == own:
-            parser = command.parser()
-            arguments = parser.instantiate(parser.parse_args(words[len(own) :]))
-            return command.function(arguments)
+            return command.function(_parsed(command, words[len(own) :]))
     return _overview(words)
+
+
+def _parsed(command: Command, words: list[str]) -> Namespace:
+    """Arguments of a command, sections as their models.
+
+    Raises
+    ------
+    ConfigError
+        An unknown argument or key, or a value that is of no use; one sentence that names it.
+    """
+    parser = command.parser()
+    try:
+        return parser.instantiate(parser.parse_args(words))
+    except (ArgumentError, ValueError, TypeError) as error:
+        raise ConfigError(_plain(one_sentence(error))) from None
+
+
+def _plain(message: str) -> str:
+    """A validation message without what only the libraries' authors need."""
+    for pattern, kept in (
+        (r'Parser key "([^"]+)": ', r"\1: "),
+        (r"\d+ validation errors? for [\w-]+ ", ""),
+        (r"Input should be", "expected to be"),
+        (r"\[type=\w+, input_value=(.*?), input_type=\w+\]", r"(got \1)"),
+    ):
+        message = re.sub(pattern, kept, message)
+    return message
 
 
 def _overview(words: list[str]) -> int:

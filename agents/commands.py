@@ -150,7 +150,9 @@ def unwrap_evaluate(arguments: Namespace) -> int:
     from agents.unwrapping import measure_unwrapping, print_unwrapping
     from shotenv.core import open_problem
     from shotenv.resolve import env_config
+    from unwrap import load_unwrapper
 
+    load_unwrapper(arguments.unwrapper)  # refused before a bank is rendered for it
     chosen = {name: arguments[name] for name in ("bank", "unwrapper", "split")}
     problem = open_problem(env_config(**chosen))
     frames = sum(clip.frames for clip in problem.clips)

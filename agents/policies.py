@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from shotenv.config import AgentConfig, ConfigError
+from shotenv.config import AgentConfig
 from unwrap.acquisition import Shots
 
 if TYPE_CHECKING:
@@ -247,7 +247,7 @@ def _read_description(path: Path) -> dict[str, Any]:
         description = json.loads(path.read_text(encoding="utf-8"))
         found = description["schema"]
     except FileNotFoundError:
-        raise ConfigError(
+        raise ValueError(
             f"{path.parent} holds no scheduler ({path.name} is missing); "
             "`shotenv train --out DIR` makes one"
         ) from None

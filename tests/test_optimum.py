@@ -1,3 +1,4 @@
+import dataclasses
 import itertools
 
 import numpy as np
@@ -6,6 +7,7 @@ import pytest
 from agents.optimum import (
     DriveTable,
     Situation,
+    best_choice,
     blind_choices,
     clairvoyant,
     cycle,
@@ -13,6 +15,8 @@ from agents.optimum import (
     greedy,
     mixture,
     play,
+    threshold,
+    threshold_choices,
 )
 
 TRIP_K, RELEASE_K, AMBIENT_K, DECAY = 330.0, 325.0, 300.0, 0.7
@@ -29,7 +33,13 @@ def draw_table(seed, *, drives=6, frames=7, heat=(3.0, 8.0, 16.0)):
     cost = rng.random((drives, frames, 3)) + np.array([0.5, 0.3, 0.0])
     heat_j = np.broadcast_to(np.array(heat), cost.shape) * rng.uniform(0.8, 1.2, (drives, 1, 1))
     return DriveTable(
-        cost, np.full((drives, frames), 3.0), heat_j, np.full(drives, 310.0), 400.0, advance
+        cost=cost,
+        tripped_cost=np.full((drives, frames), 3.0),
+        heat_j=heat_j,
+        snr=rng.random(cost.shape),
+        start_k=np.full(drives, 310.0),
+        span_k=(300.0, 360.0),
+        advance=advance,
     )
 
 
@@ -98,6 +108,26 @@ def test_no_blind_choice_beats_the_optimum():
 
 def test_cycle_and_mixture_ignore_the_drive():
     table = draw_table(7)
-    now = Situation(4, table.start_k, np.zeros(6, bool), table)
+    now = Situation(4, table.start_k, np.zeros(6, bool), np.zeros(6), table)
     np.testing.assert_array_equal(cycle((2, 0, 0))(now), np.zeros(6))
     np.testing.assert_array_equal(mixture((0.0, 1.0, 0.0))(now), np.ones(6))
+
+
+def test_threshold_acts_on_what_the_last_acquisition_told():
+    table = draw_table(8, heat=(0.0, 0.0, 0.0))
+    played = play(table, threshold(0.5, 2, 0))
+    assert (played.actions[:, 0] == 2).all(), "nothing was told before the first frame"
+    told = np.take_along_axis(table.snr, played.actions[:, :, None], axis=2)[:, :-1, 0]
+    np.testing.assert_array_equal(played.actions[:, 1:], np.where(told < 0.5, 2, 0))
+
+
+def test_tuning_finds_the_rule_that_the_costs_were_made_for():
+    table = draw_table(9, drives=8, frames=80, heat=(0.0, 0.0, 0.0))
+    snr = np.repeat(
+        np.repeat(np.random.default_rng(0).random((8, 16)), 5, axis=1)[:, :, None], 3, 2
+    )
+    cost = np.where(snr < 0.37, (1.0, 0.5, 0.0), (0.0, 0.5, 1.0))
+    table = dataclasses.replace(table, snr=snr, cost=cost)
+    rule = best_choice(table, threshold_choices(table))
+    assert rule.below == 2 and rule.above == 0
+    assert rule.limit == pytest.approx(0.37, abs=0.03)

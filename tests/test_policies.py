@@ -12,7 +12,7 @@ from agents.policies import (
     SnrThresholdPolicy,
     build_network,
 )
-from shotenv.config import AgentConfig, ConfigError
+from shotenv.config import AgentConfig
 
 NAMES = ("gray_mean", "signal_to_noise", "time_left")
 ONE, BATCH = np.zeros(3, np.float32), np.zeros((5, 3), np.float32)
@@ -73,7 +73,7 @@ def test_wrong_arguments_are_named():
 
 
 def test_missing_and_damaged_schedulers_are_named(tmp_path: Path):
-    with pytest.raises(ConfigError, match=r"agent\.json is missing"):
+    with pytest.raises(ValueError, match=r"agent\.json is missing"):
         PpoPolicy.load(tmp_path)
     config = AgentConfig(hidden=(8,))
     PpoPolicy(build_network(3, config), config, NAMES).save(tmp_path)
