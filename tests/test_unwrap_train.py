@@ -11,6 +11,7 @@ from unwrap_bank import write_bank
 from unwrap.data import BankFrames
 from unwrap.train import TrainConfig, TrainingModule, loss_of, train, wrap_classes, wrap_hits
 from unwrap.unwrapper import load_unwrapper
+from unwrap.weights import save_weights
 
 SMALL = TrainConfig(width=4, epochs=2, batch_size=4)
 
@@ -140,3 +141,20 @@ def test_hits_are_predictions_within_half_a_wrap():
     right, scored = wrap_hits(predicted_m, truth_m, SMALL)
     assert right.tolist() == [True, True, False, False]
     assert scored.tolist() == [True, True, True, False]
+
+
+def test_start_from_takes_over_the_layers_that_fit(tmp_path):
+    other = TrainConfig(network="tofregnet", width=4, seed=1).build()
+    save_weights(
+        tmp_path / "other.safetensors",
+        other,
+        {"network": "tofregnet", "width": 4, "range_m": 30.0, "f1_hz": 24e6},
+    )
+    start = str(tmp_path / "other.safetensors")
+    network = TrainConfig(network="tofsegnet", width=4, start_from=start).build()
+    stem = "stem.0.weight"
+    expected = other.state_dict()[stem].to(torch.float16).float()
+    assert torch.equal(network.state_dict()[stem], expected)
+    assert network.head.weight.shape[0] == 4 * 5
+    with pytest.raises(ValueError, match="start_from has width 4; expected 8"):
+        TrainConfig(network="tofsegnet", width=8, start_from=start).build()

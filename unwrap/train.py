@@ -30,6 +30,7 @@ from unwrap.losses import EQUATION_7, regression_loss, wrap_loss
 from unwrap.merge import nearest_wraps
 from unwrap.nets import Autoencoder, TofRegNet, TofSegNet, autocast
 from unwrap.phase import unambiguous_range_m
+from unwrap.unwrapper import load_unwrapper
 from unwrap.weights import save_weights, write_atomically
 
 AUGMENTATION_STREAM = 1
@@ -72,6 +73,9 @@ class TrainConfig(BaseModel):
     contrast: float = Field(0.2, ge=0, description="largest relative change of gamma")
     brightness: float = Field(0.3, ge=0, description="largest relative change of gain")
     seed: int = Field(0, ge=0, description="seed of weights, order and augmentation")
+    start_from: str | None = Field(
+        None, description="name or path of a network whose layers of equal shape are taken over"
+    )
 
     @property
     def unambiguous_m(self) -> float:
@@ -90,8 +94,31 @@ class TrainConfig(BaseModel):
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(self.seed)
             if self.network == "tofregnet":
-                return TofRegNet(self.width, self.clamp_m)
-            return TofSegNet(self.width, self.classes)
+                network: Autoencoder = TofRegNet(self.width, self.clamp_m)
+            else:
+                network = TofSegNet(self.width, self.classes)
+        if self.start_from is not None:
+            take_over(network, load_unwrapper(self.start_from).network)
+        return network
+
+
+def take_over(network: Autoencoder, other: Autoencoder) -> None:
+    """Copy the layers of `other` that have the same name and shape in `network`.
+
+    Raises
+    ------
+    ValueError
+        There is none, as the widths differ.
+    """
+    own = network.state_dict()
+    shared = {
+        name: tensor
+        for name, tensor in other.state_dict().items()
+        if name in own and own[name].shape == tensor.shape and tensor.ndim > 0
+    }
+    if not shared:
+        raise ValueError(f"start_from has width {other.width}; expected {network.width}")
+    network.load_state_dict({**own, **shared})
 
 
 def wrap_classes(depth_m: Tensor, unambiguous_m: float, classes: int) -> Tensor:
