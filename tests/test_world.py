@@ -53,7 +53,7 @@ def cast(corners, origin, directions):
     return np.where(hit, distance, np.inf)
 
 
-def view(pose, columns=20, rows=15):
+def view(pose, columns=16, rows=12):
     """Directions of a coarse grid of camera rays, 60 degrees across."""
     half = np.tan(np.radians(30.0))
     y, z = np.meshgrid(np.linspace(half, -half, columns), np.linspace(half, -half, rows) * 0.75)
@@ -65,13 +65,13 @@ def view(pose, columns=20, rows=15):
 
 @pytest.fixture(scope="module")
 def views(drawn):
-    """Sorted distances along coarse camera rays at the start of the dense clips, by family."""
+    """The two nearest distances along coarse camera rays as the dense clips start, by family."""
     result = {family: [] for family in FAMILIES}
     for config, world in drawn:
         if config is CLIP:
             pose = world.ego.at(0.0)
             hits = cast(corners_at(world, 0.0), np.array(pose.position_m), view(pose))
-            result[world.family].append(np.sort(hits, axis=1)[:, :2])
+            result[world.family].append(np.partition(hits, 1, axis=1)[:, :2])
     return {family: np.array(hits) for family, hits in result.items()}
 
 
@@ -200,7 +200,7 @@ def test_most_worlds_have_something_moving(drawn):
 def test_moving_things_stand_on_the_ground(drawn):
     for config, world in drawn:
         for thing in world.moving:
-            assert thing.mesh.corners[..., 2].min() == pytest.approx(0.0, abs=2e-3)
+            assert thing.mesh.corners[..., 2].min() == pytest.approx(0.0, abs=5e-3)
             for time in (0.0, duration_s(config)):
                 above = np.add(thing.motion.at(time).position_m, (0.0, 0.0, 0.05))
                 fall = cast(world.static.corners, above, np.array([[0.0, 0.0, -1.0]])).min()
@@ -219,7 +219,7 @@ ASSETS = {
     "bollard": furniture.bollard,
     "cone": furniture.cone,
     "crate": furniture.crate,
-    "bin": furniture.bin_,
+    "bin": furniture.rubbish_bin,
     "lamp_post": lambda rng: furniture.lamp_post(rng, 6.0),
     "hedge": lambda rng: furniture.hedge(rng, 8.0),
     "fence": lambda rng: furniture.fence(rng, 8.0),
@@ -252,10 +252,10 @@ def test_no_two_faces_fight_for_the_same_place(views):
 
 def test_every_wrap_count_is_seen(views):
     for family, hits in views.items():
-        distance = hits[..., 0]
+        wraps = np.floor(np.minimum(hits[..., 0], 1e3) / UNAMBIGUOUS_M)
         for wrap in range(4):
-            inside = (distance >= wrap * UNAMBIGUOUS_M) & (distance < (wrap + 1) * UNAMBIGUOUS_M)
-            assert np.mean(inside) > 0.01, (family, wrap)
+            # A garage seldom has 19 m of free sight.
+            assert np.mean(wraps == wrap) > (0.001 if family == "garage" else 0.01), (family, wrap)
 
 
 def test_a_third_of_the_clips_are_near_field(views):
@@ -267,7 +267,7 @@ def test_first_distances_are_far_and_near(views):
     distance = np.concatenate([hits[..., 0].ravel() for hits in views.values()])
     scored = distance[distance < 25.0]
     share, _ = np.histogram(scored, bins=[0.5, 1.5, 3.0, 6.0, 9.0, 12.0, 16.0, 20.0, 25.0])
-    assert (share / len(scored) > 0.005).all()
+    assert (share / len(scored) > 0.005).all(), share
 
 
 @pytest.mark.parametrize("rate", [0.0, 0.3, -1.2])
@@ -305,8 +305,10 @@ def test_site_lets_crowns_hang_over_and_rooms_end():
     post = meshes.join([a_box((0.2, 0.2, 3.0)), meshes.at(a_box((4.0, 4.0, 1.0)), 0.0, 0.0, 3.0)])
     assert site.put(post, 2.0, 0.0)
     assert site.put(a_box(), 3.0, 0.0)
-    site.enclose((-10.0, 8.0), (-3.0, 3.0))
+    site.enclose((-10.0, 8.0), (-3.0, 3.0), 2.5)
     assert not site.put(a_box(), 8.0, 0.0)
+    assert not site.put(a_box((1.0, 1.0, 2.6)), 5.0, 2.0)
+    assert site.put(a_box(), 5.0, 2.0)
 
 
 def test_solids_have_their_volume_and_face_outwards():

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shotenv.config import FAMILIES, Family, WorldConfig
+from shotenv.config import FAMILIES, Family, Range, WorldConfig
 from shotenv.world import enclosed, lights, roads
-from shotenv.world.materials import Range
 from shotenv.world.model import Light, Motion, Pose, World
 from shotenv.world.site import Site
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from shotenv.config import Range
 from shotenv.world import buildings, furniture, lights, meshes, vehicles
 from shotenv.world import materials as m
 from shotenv.world.model import Indoor, Lamp, Motion, Pose
@@ -14,9 +15,10 @@ from shotenv.world.traffic import approaching_car, crossing, lead, row, walkers
 TUBE_LAMP_M = 1.4
 TUBE_WIDTH_M = 0.12
 SLAB_M = 0.3
+BEAM_M = 0.22
 
 
-def garage(site: Site, rng: np.random.Generator, irradiance: m.Range) -> None:
+def garage(site: Site, rng: np.random.Generator, irradiance: Range) -> None:
     """An aisle between bays with parked cars and pillars, an end wall, perhaps with daylight.
 
     Parameters
@@ -28,14 +30,15 @@ def garage(site: Site, rng: np.random.Generator, irradiance: m.Range) -> None:
     """
     height, aisle, depth = rng.uniform(2.25, 2.9), rng.uniform(5.5, 7.0), rng.uniform(4.8, 5.2)
     near = rng.random() < 0.4
-    end = site.travel_m + (rng.uniform(0.9, 6.0) if near else rng.uniform(8.0, 28.0))
+    end = site.travel_m + (0.7 + 5.0 * rng.uniform() ** 1.5 if near else rng.uniform(8.0, 28.0))
     half = aisle / 2 + depth
     shell(site, rng, end, half, height)
-    site.enclose((-10.0, end - 0.05), (-half + 0.05, half - 0.05))
     bay_lines(site, rng, end, aisle, depth)
     bay = rng.uniform(2.5, 2.8)
     for side in (-1, 1):
         pillars(site, rng, end, side * (aisle / 2 + 0.5), 2 * bay, height)
+    site.enclose((-10.0, end - 0.05), (-half + 0.05, half - 0.05), height - BEAM_M)
+    for side in (-1, 1):
         parked(site, rng, end, side * (aisle / 2 + depth / 2 + 0.2), bay, side)
     if near and rng.random() < 0.5:
         site.put(vehicles.car(rng), end - 1.2, rng.uniform(-0.5, 0.5), np.pi / 2)
@@ -51,7 +54,7 @@ def garage(site: Site, rng: np.random.Generator, irradiance: m.Range) -> None:
 
 def pavement_low(rng: np.random.Generator) -> meshes.Mesh:
     """Something that fits under a garage's ceiling."""
-    things = (furniture.crate, furniture.bin_, furniture.cone, furniture.bollard)
+    things = (furniture.crate, furniture.rubbish_bin, furniture.cone, furniture.bollard)
     return things[rng.integers(len(things))](rng)
 
 
@@ -63,7 +66,7 @@ def shell(site: Site, rng: np.random.Generator, end: float, half: float, height:
     size = (end - start + 2.0, 2 * half + 2.0, SLAB_M)
     site.build(meshes.box(size, concrete, ((start + end) / 2, 0.0, height)))
     for x in np.arange(start + 2.0, end, 5.2):
-        site.build(meshes.box((0.35, 2 * half, 0.22), concrete, (x, 0.0, height - 0.22)))
+        site.build(meshes.box((0.35, 2 * half, BEAM_M), concrete, (x, 0.0, height - BEAM_M)))
     pipe, y = m.METAL.draw(rng), rng.uniform(-half + 1.0, half - 1.0)
     site.build(meshes.rod((start, y, height - 0.32), (end, y, height - 0.32), 0.07, pipe))
     for side in (-1, 1):
@@ -134,7 +137,7 @@ def ceiling_lamps(
     rng: np.random.Generator,
     x: tuple[float, float],
     height: float,
-    irradiance: m.Range,
+    irradiance: Range,
     rows: tuple[float, ...],
 ) -> None:
     """Tubes under a ceiling along x, all of one kind, a few of them dead."""
@@ -153,7 +156,7 @@ def ceiling_lamps(
                 )
 
 
-def tunnel(site: Site, rng: np.random.Generator, irradiance: m.Range) -> None:
+def tunnel(site: Site, rng: np.random.Generator, irradiance: Range) -> None:
     """A two-lane tube with lamps and kerbs; its exit opens on a road in daylight."""
     lane = rng.uniform(3.0, 3.6)
     centre, half = lane / 2, lane + rng.uniform(0.9, 1.6)
@@ -218,8 +221,7 @@ def kerbs_and_paint(
     )
     width = half - lane
     for side in (-1, 1):
-        size = (exit_x + BEHIND_M, width, 0.15)
-        middle = (exit_x - BEHIND_M) / 2
+        size, middle = (far + BEHIND_M, width, 0.15), (far - BEHIND_M) / 2
         site.build(meshes.box(size, stone, (middle, centre + side * (half - width / 2), 0.0)))
         y = centre + side * (lane - 0.15)
         site.build(meshes.patch((-BEHIND_M, far), (y - 0.06, y + 0.06), PAINT_M, paint))

@@ -159,7 +159,7 @@ def crate(rng: np.random.Generator) -> Mesh:
     return meshes.join([lower, upper]) if rng.random() < 0.4 else lower
 
 
-def bin_(rng: np.random.Generator) -> Mesh:
+def rubbish_bin(rng: np.random.Generator) -> Mesh:
     """A wheeled rubbish bin with its lid."""
     body, lid = m.DARK_CLOTHES.draw(rng), m.DARK_METAL.draw(rng)
     slope = [(-0.25, 0.0), (0.2, 0.0), (0.32, 0.95), (-0.28, 0.95)]

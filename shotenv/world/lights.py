@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shotenv.world.materials import Range, log_uniform
+from shotenv.config import Range
+from shotenv.world.materials import log_uniform
 from shotenv.world.model import Lamp, Light
 
 G173_IRRADIANCE = 11.6

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-Range = tuple[float, float]
+from shotenv.config import Range
 
 
 @dataclass(frozen=True)

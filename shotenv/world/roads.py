@@ -84,7 +84,7 @@ def car_park(site: Site, rng: np.random.Generator) -> None:
     far = site.travel_m + REACH_M
     ground = (m.ASPHALT if rng.random() < 0.6 else m.PAVING).draw(rng)
     site.build(meshes.patch((-BEHIND_M, far), (-REACH_M, REACH_M), 0.0, ground))
-    end = site.travel_m + rng.uniform(0.75, 6.0)
+    end = site.travel_m + 0.7 + 5.0 * rng.uniform() ** 1.5
     bays(site, rng, end, rng.uniform(2.5, 2.9))
     ahead = rng.random()
     if ahead < 0.35:
@@ -98,7 +98,7 @@ def car_park(site: Site, rng: np.random.Generator) -> None:
         for y in (-5.4, -2.7, 2.7, 5.4):
             if rng.random() < 0.5:
                 site.put(vehicles.car(rng), x, y + rng.uniform(-0.2, 0.2), rng.integers(2) * np.pi)
-    crossing(site, rng, (-4.0, 4.0), near=0.8)
+    crossing(site, rng, (-4.0, 4.0), near=0.9)
     walkers(site, rng, rng.integers(1, 4), (-6.0, 6.0))
     row(site, rng, pavement_thing, 0.0, 2.5, 0.0, share=0.5, spread=5.0)
     street_lamps(site, rng, -rng.uniform(3, 6), 14.0)
@@ -132,15 +132,16 @@ def carriageway(
 
 def patches(site: Site, rng: np.random.Generator, right: float, left: float) -> None:
     """Repaired asphalt and manhole covers."""
-    for _ in range(rng.integers(1, 5)):
+    for layer in range(rng.integers(1, 5)):
+        height = 0.002 + 0.001 * layer
         x, y = rng.uniform(2, 20 + site.travel_m), rng.uniform(right + 0.8, left - 0.8)
         if rng.random() < 0.5:
             tar = m.ASPHALT.draw(rng)
             length, half = rng.uniform(0.8, 4.0), rng.uniform(0.3, 0.7)
-            site.build(meshes.patch((x, x + length), (y - half, y + half), 0.004, tar))
+            site.build(meshes.patch((x, x + length), (y - half, y + half), height, tar))
         else:
             outline = furniture.regular_polygon(10, 0.33, 0.0)
-            disc = [(x + u, y + v, 0.006) for u, v in outline]
+            disc = [(x + u, y + v, height) for u, v in outline]
             site.build(meshes.polygon(disc, m.DARK_METAL.draw(rng)))
 
 

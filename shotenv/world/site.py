@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shotenv.config import Family
+from shotenv.config import Family, Range
 from shotenv.world import meshes
 from shotenv.world.model import (
     MAX_LAMPS,
@@ -59,12 +59,13 @@ class Site:
         self.lamps: list[Lamp] = []
         self.indoor: Indoor | None = None
         self.room = np.array([[-np.inf, -np.inf], [np.inf, np.inf]])
+        self.ceiling_m = np.inf
         self._taken = [self._ego_footprint()]
         self._triangles = 0
 
-    def enclose(self, x: tuple[float, float], y: tuple[float, float]) -> None:
-        """From now on keep things inside a rectangle."""
-        self.room = np.array([x, y]).T
+    def enclose(self, x: Range, y: Range, ceiling_m: float) -> None:
+        """From now on keep things inside a rectangle and under a ceiling."""
+        self.room, self.ceiling_m = np.array([x, y]).T, ceiling_m
 
     @property
     def travel_m(self) -> float:
@@ -79,12 +80,17 @@ class Site:
     def put(self, mesh: Mesh, x: float, y: float, yaw: float = 0.0, z: float = 0.0) -> bool:
         """Stand a thing at (x, y) on a floor of height `z`; false if there is no room."""
         pose = Pose((x, y, z), yaw)
-        return self._claim(mesh, [pose]) and not self.static.append(meshes.place(mesh, pose))
+        free = self._claim(mesh, [pose])
+        if free:
+            self.static.append(meshes.place(mesh, pose))
+        return free
 
     def move(self, mesh: Mesh, motion: Motion) -> bool:
         """Add a thing that moves; false if its way is not free."""
-        poses = [motion.at(time) for time in self.times]
-        return self._claim(mesh, poses) and not self.moving.append(MovingObject(mesh, motion))
+        free = self._claim(mesh, [motion.at(time) for time in self.times])
+        if free:
+            self.moving.append(MovingObject(mesh, motion))
+        return free
 
     def world(self, family: Family, seed: int, light: Light) -> World:
         """The finished world; the nearest lamps are kept if there are too many."""
@@ -99,8 +105,11 @@ class Site:
     def _claim(self, mesh: Mesh, poses: list[Pose]) -> bool:
         taken = footprints(mesh, poses)
         inside = (taken[:, 0] >= self.room[0]).all() and (taken[:, 1] <= self.room[1]).all()
-        fits = self._triangles + len(mesh.corners) <= MAX_TRIANGLES
-        if not (inside and fits) or any(overlap(taken, other) for other in self._taken):
+        low_enough = poses[0].position_m[2] + mesh.corners[..., 2].max() < self.ceiling_m
+        affordable = self._triangles + len(mesh.corners) <= MAX_TRIANGLES
+        if not (inside and low_enough and affordable):
+            return False
+        if any(overlap(taken, other) for other in self._taken):
             return False
         self._taken.append(taken)
         self._triangles += len(mesh.corners)

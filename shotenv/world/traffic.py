@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from shotenv.config import Range
 from shotenv.world import furniture, lights, people, vehicles
 from shotenv.world import materials as m
-from shotenv.world.materials import Range
 from shotenv.world.model import Lamp, Mesh, Motion, Pose
 from shotenv.world.site import Site
 
@@ -21,7 +21,7 @@ TRIES = 4
 
 def walkers(site: Site, rng: np.random.Generator, count: int, y: Range, z: float = 0.0) -> None:
     """People who stand or walk along the road, either way."""
-    near = site.travel_m + 1.5
+    near = site.travel_m + 0.9
     far = max(near, min(near + 17.0, site.room[1, 0] - 0.5))
     for _ in range(count):
         speed = rng.uniform(0.7, 1.8) if rng.random() < 0.75 else 0.0
@@ -54,7 +54,7 @@ def lead(site: Site, rng: np.random.Generator) -> None:
         return
     speed = site.ego.speed_m_s * rng.uniform(0.8, 1.15)
     # The car's own half length comes on top of the gap; braking shortens the gap during the clip.
-    gap = 1.2 + rng.uniform(0.0, 3.0) + 0.8 * site.ego.speed_m_s * rng.uniform(0.3, 1.2)
+    gap = 0.6 + rng.uniform(0.0, 3.5) + 0.8 * site.ego.speed_m_s * rng.uniform(0.3, 1.2)
     tail = m.log_uniform(rng, TAIL_RADIANCE) if site.night else 0.0
     vehicle = vehicles.cyclist(rng) if rng.random() < 0.12 else vehicles.car(rng, 0.0, tail)
     start = Pose((gap + 2.6, rng.uniform(-0.3, 0.3), 0.0))
@@ -79,10 +79,10 @@ def approaching_car(site: Site, rng: np.random.Generator, motion: Motion) -> Non
     if not site.move(mesh, motion) or not intensity or motion.speed_m_s:
         return
     x, y, _ = motion.start.position_m
-    nose = float(mesh.corners[..., 0].max()) + 0.15
+    nose, ahead = float(mesh.corners[..., 0].max()) + 0.15, lights.direction(np.pi, -0.03)
     for side in (-0.6, 0.6):
         site.lamps.append(
-            Lamp((x - nose, y + side, 0.7), intensity, 0.1, (-1.0, 0.0, -0.03), float(np.cos(0.5)))
+            Lamp((x - nose, y + side, 0.7), intensity, 0.1, ahead, float(np.cos(0.5)))
         )
 
 
@@ -146,6 +146,6 @@ def pavement_thing(rng: np.random.Generator) -> Mesh:
     """Something from a town's pavement."""
     return one_of(
         rng,
-        (furniture.bollard, furniture.sign, furniture.sign, furniture.crate, furniture.bin_,
+        (furniture.bollard, furniture.sign, furniture.sign, furniture.crate, furniture.rubbish_bin,
          furniture.tree, furniture.bush, furniture.pole, furniture.cone),
     )  # fmt: skip

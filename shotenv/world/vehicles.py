@@ -168,7 +168,7 @@ def rear_trim(rng: np.random.Generator, shape: CarShape, radiance: float) -> Mes
 def cyclist(rng: np.random.Generator) -> Mesh:
     """A bicycle and the person on it."""
     metal, tyre = m.DARK_METAL.draw(rng), m.TYRE.draw(rng)
-    hub_rear, hub_front, crank = (-0.5, 0.0, 0.34), (0.52, 0.0, 0.34), (-0.05, 0.0, 0.30)
+    hub_rear, hub_front, crank = (-0.5, 0.0, 0.35), (0.52, 0.0, 0.35), (-0.05, 0.0, 0.30)
     saddle, handle = (-0.2, 0.0, 0.92), (0.38, 0.0, 0.98)
     joints = [(hub_rear, crank), (hub_rear, saddle), (crank, saddle), (crank, handle)]
     joints += [(saddle, handle), (handle, hub_front), ((0.38, -0.25, 1.0), (0.38, 0.25, 1.0))]
