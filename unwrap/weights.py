@@ -150,6 +150,7 @@ def write_atomically(path: Path, content: bytes) -> None:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
+            os.fchmod(file.fileno(), 0o644)  # A temporary file is its owner's alone.
             Path(file.name).replace(path)
         except BaseException:
             Path(file.name).unlink(missing_ok=True)
