@@ -53,9 +53,9 @@ def error_against_energy(results: dict[str, Any]) -> go.Figure:
             font={"color": color, "size": 12},
             showarrow=False,
             xanchor="left",
-            yanchor="bottom",
+            yanchor="top" if chosen else "bottom",
             xshift=7,
-            yshift=4,
+            yshift=-4 if chosen else 4,
         )
     figure.update_xaxes(title="laser energy per drive, J", rangemode="tozero", **AXIS)
     figure.update_yaxes(title="mean absolute depth error, m", rangemode="tozero", **AXIS)

@@ -53,7 +53,7 @@ def _clip_scores(problem: Problem, clip: Clip) -> list[Scores]:
                 {shots: acquisition.raw for shots, acquisition in made.items()},
                 problem.kept.of(frames[step]),
                 one.truth_m,
-                one.scored,
+                one.scored > 0,
                 problem.description,
                 offset_lsb=drive.offsets.calibrated_lsb,
                 noise_lsb=one.noise_lsb,
