@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from gymnasium import spaces
 
-from shotenv.core import observe, reset, step
+from shotenv.core import State, observe, reset, step
 from shotenv.draw import draw_frame
 from shotenv.info import reset_infos, step_infos
 from shotenv.observe import FEATURES, LIMIT
@@ -95,17 +95,17 @@ class ShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
         self.observation_space = feature_space()
         self.action_space = spaces.Discrete(ACTIONS)
         self.reward_space = reward_space()
-        self.state = None
-        self._shown = None
+        self.state: State | None = None
+        self._shown: tuple[State, int] | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Start a new drive."""
         super().reset(seed=seed)
-        self.state = reset(self.problem, [drive_seed(self.np_random)])
-        self._shown = self.state, 0
-        return self._observation(), reset_infos(self.problem, self.state)[0]
+        state = reset(self.problem, [drive_seed(self.np_random)])
+        self.state, self._shown = state, (state, 0)
+        return self._observed(state), reset_infos(self.problem, state)[0]
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Take the frame with the shots of `action`.
@@ -121,11 +121,11 @@ class ShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
         before = self.state
         if before is None or int(before.step) >= self.problem.config.frames_per_drive:
             raise gymnasium.error.ResetNeeded("no drive is under way; call reset() first")
-        self.state, outcome = step(self.problem, before, chosen)
-        self._shown = before, int(outcome.shots)
-        info = step_infos(self.problem, before, self.state, outcome)[0]
+        after, outcome = step(self.problem, before, chosen)
+        self.state, self._shown = after, (before, int(outcome.shots))
+        info = step_infos(self.problem, before, after, outcome)[0]
         reward, truncated = float(outcome.reward), bool(outcome.truncated)
-        return self._observation(), reward, False, truncated, info
+        return self._observed(after), reward, False, truncated, info
 
     def render(self) -> np.ndarray | None:
         """Picture uint8 [h, w, 3] of the last frame; None without a render mode."""
@@ -135,5 +135,5 @@ class ShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
             raise gymnasium.error.ResetNeeded("no drive is under way; call reset() first")
         return draw_frame(self.problem, *self._shown)
 
-    def _observation(self) -> np.ndarray:
-        return observe(self.problem, self.state)[0].numpy()
+    def _observed(self, state: State) -> np.ndarray:
+        return observe(self.problem, state)[0].numpy()

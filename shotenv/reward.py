@@ -129,4 +129,5 @@ def weights(config: RewardConfig) -> dict[str, float]:
 
 def reward(terms: dict[str, Tensor], config: RewardConfig) -> Tensor:
     """Minus the weighted sum of the terms, float64 [B]."""
-    return -sum(weight * terms[name] for name, weight in weights(config).items())
+    weighted = [weight * terms[name] for name, weight in weights(config).items()]
+    return -torch.stack(weighted).sum(dim=0)

@@ -115,7 +115,7 @@ class ShotScheduleVectorEnv(VectorEnv):
         restarted = resting
         if self.autoreset_mode == AutoresetMode.SAME_STEP:
             restarted, last = truncated, self._observations()
-            for row in np.flatnonzero(truncated):
+            for row in np.flatnonzero(truncated).tolist():
                 told[row] = {"final_obs": last[row], "final_info": told[row]}
         for row, info in self._restart(np.flatnonzero(restarted)).items():
             told[row] = told.get(row, {}) | info
@@ -128,7 +128,7 @@ class ShotScheduleVectorEnv(VectorEnv):
         """Play one frame of the drives `rows`: their infos by row, and their rewards."""
         if not len(rows):
             return {}, np.zeros(0)
-        index, before = torch.from_numpy(rows), self.state
+        index, before = torch.from_numpy(rows), self._under_way()
         whole = len(rows) == self.num_envs
         part = before if whole else take(before, index)
         after, outcome = step(self.problem, part, actions[index])
@@ -168,8 +168,13 @@ class ShotScheduleVectorEnv(VectorEnv):
             return None
         return tuple(draw_frame(self.problem, *self._shown[row]) for row in range(self.num_envs))
 
+    def _under_way(self) -> State:
+        if self.state is None:
+            raise gymnasium.error.ResetNeeded("no drives are under way; call reset() first")
+        return self.state
+
     def _observations(self) -> np.ndarray:
-        return observe(self.problem, self.state).numpy()
+        return observe(self.problem, self._under_way()).numpy()
 
     def _check_actions(self, actions: Any) -> torch.Tensor:
         values = np.asarray(actions)

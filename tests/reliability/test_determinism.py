@@ -11,8 +11,13 @@ from pathlib import Path
 
 import gymnasium
 import numpy as np
+import torch
 
 import shotenv
+from shotenv.frames import Exposure
+from shotenv.sensor import draw_noise, expose
+from unwrap.acquisition import Shots
+from unwrap.phase import decode
 
 STEPS = 500
 PROGRAM = """
@@ -30,7 +35,7 @@ def digest(kwargs) -> str:
     """SHA-256 over everything that a vector of two tells in some steps through an auto-reset."""
     env = gymnasium.make_vec(shotenv.ENV_ID, num_envs=2, **kwargs)
     summary = hashlib.sha256(env.reset(seed=17)[0].tobytes())
-    actions = np.random.default_rng(0).integers(0, 3, (40, 2))
+    actions = np.random.default_rng(0).integers(0, 3, (34, 2))
     for chosen in actions:
         observation, reward, _, truncated, info = env.step(chosen)
         for part in (observation, reward, truncated, info.get("vector_reward", reward)):
@@ -65,3 +70,37 @@ def test_fresh_processes_agree_whatever_hash_seed_and_threads(tiny_kwargs):
         )
         found.add(done.stdout.strip())
     assert len(found) == 1
+
+
+def test_large_frames_do_not_depend_on_threads_or_batch(sensor):
+    """At 320 x 240 torch splits maps among threads; not a bit may depend on where it cuts."""
+    generator = torch.Generator().manual_seed(2)
+    unit = torch.rand(3, 11, 240, 320, generator=generator)
+    exposure = Exposure(
+        0.01 * unit[:, :8] - 0.005, 0.01 + 0.01 * unit[:, 8], unit[:, 9], unit[:, 10]
+    )
+    noise = torch.stack([draw_noise(seed, 0, 4, 240, 320) for seed in range(3)])
+    one = torch.ones(3, dtype=torch.float64)
+
+    def found(rows: slice) -> tuple[torch.Tensor, ...]:
+        raw = expose(
+            exposure[rows],
+            sensor,
+            shots=Shots.FOUR,
+            laser_power_w=7.0 * one[rows],
+            integration_s=6e-4 * one[rows],
+            noise=noise[rows],
+            offsets=None,
+        )
+        phase = decode(raw.dcs_lsb)
+        return raw.dcs_lsb, phase.phase_rad, phase.amplitude
+
+    threads, results = torch.get_num_threads(), []
+    for count in (1, 2):
+        torch.set_num_threads(count)
+        results.append(found(slice(0, 3)))
+        singles = [found(slice(row, row + 1)) for row in range(3)]
+        results.append(tuple(torch.cat(parts) for parts in zip(*singles, strict=True)))
+    torch.set_num_threads(threads)
+    for result in results[1:]:
+        assert all(torch.equal(a, b) for a, b in zip(results[0], result, strict=True))
