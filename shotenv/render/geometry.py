@@ -75,12 +75,11 @@ def geometry_at(world: World, times_s: Sequence[float], bounces: int) -> Geometr
 
 
 def tile_grid(count: int, spacing_m: float) -> np.ndarray:
-    """Offsets [count, 3] on a square grid about the origin, metres."""
+    """Offsets [count, 3] on a square grid about the origin, metres; spacing in whole metres."""
     side = math.ceil(math.sqrt(count))
     row, column = np.divmod(np.arange(count), side)
-    offsets = np.stack([column, row, np.zeros(count)], axis=1).astype(float)
-    offsets[:, :2] -= offsets[:, :2].mean(axis=0)
-    return np.round(offsets * spacing_m)
+    offsets = np.stack([column - (side - 1) / 2, row - row.max() / 2, np.zeros(count)], axis=1)
+    return offsets * math.ceil(spacing_m)
 
 
 def _posed(world: World, time_s: float) -> np.ndarray:

@@ -27,9 +27,8 @@ def stock_scene(world: World, time_s: float, camera: CameraConfig) -> Any:
     description = {
         "type": "scene",
         "triangles": _triangles(world, time_s),
-        "sky": {"type": "constant", "radiance": world.light.sky_zenith},
         "sensor": _sensor(world.ego.at(time_s), camera),
-        **_sun(world.light),
+        **_emitters(world.light),
     }
     return mi.load_dict(description)
 
@@ -84,8 +83,10 @@ def _sensor(pose: Pose, camera: CameraConfig) -> dict[str, Any]:
     }
 
 
-def _sun(light: Light) -> dict[str, Any]:
-    if light.sun_irradiance == 0:
-        return {}
+def _emitters(light: Light) -> dict[str, Any]:
+    """Sun and sky, without those that are dark: the path integrator would aim at them too."""
     away = [-component for component in light.sun_direction]
-    return {"sun": {"type": "directional", "direction": away, "irradiance": light.sun_irradiance}}
+    sun = {"type": "directional", "direction": away, "irradiance": light.sun_irradiance}
+    sky = {"type": "constant", "radiance": light.sky_zenith}
+    lit = {"sun": light.sun_irradiance > 0, "sky": light.sky_zenith > 0}
+    return {name: emitter for name, emitter in (("sun", sun), ("sky", sky)) if lit[name]}

@@ -193,12 +193,11 @@ def _serve(pipe: Connection, function: Callable[[Job], Result], threads: int) ->
         except EOFError:
             return
         try:
-            answer = (function(job), None, None)
+            pipe.send((function(job), None, None))
         except RendererError as error:
-            answer = (None, str(error), None)
+            pipe.send((None, str(error), None))
         except Exception as error:
-            answer = (None, f"{type(error).__name__}: {error}", traceback.format_exc())
-        pipe.send(answer)
+            pipe.send((None, f"{type(error).__name__}: {error}", traceback.format_exc()))
 
 
 def _die_with_parent() -> None:

@@ -1,0 +1,91 @@
+"""Worlds of a few triangles whose light has a closed form."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from shotenv.config import CameraConfig
+from shotenv.render import Instants
+from shotenv.world.model import Light, Mesh, Motion, MovingObject, Pose, World
+
+DARK = Light(0.0, (0.0, 0.0, 1.0), 0.0, 0.0, ())
+ALBEDO = 0.4
+SMALL = CameraConfig(width=17, height=17, samples_per_pixel=1, gray_instants=1, bounces=1)
+MIDDLE = (8, 8)
+
+
+def square(centre, across, up) -> np.ndarray:
+    """Two triangles [2, 3, 3]: a parallelogram about `centre` with these half edges."""
+    c, a, u = (np.asarray(vector, dtype=float) for vector in (centre, across, up))
+    corners = [c - a - u, c + a - u, c + a + u, c - a + u]
+    return np.float32([[corners[i] for i in face] for face in ((0, 1, 2), (0, 2, 3))])
+
+
+def wall(distance_m: float, half_m: float = 60.0) -> np.ndarray:
+    """A wall across the x axis."""
+    return square((distance_m, 0, 0), (0, half_m, 0), (0, 0, half_m))
+
+
+def floor(half_m: float = 100.0) -> np.ndarray:
+    """The ground at z = 0."""
+    return square((0, 0, 0), (half_m, 0, 0), (0, half_m, 0))
+
+
+def mesh(corners: np.ndarray, albedo: float = ALBEDO, retro=0.0, emission=0.0) -> Mesh:
+    """A mesh of one plain material."""
+    faces = len(corners)
+    return Mesh(
+        corners=np.asarray(corners, np.float32),
+        uv=np.zeros((faces, 3, 2), np.float32),
+        albedo_low=np.full(faces, albedo, np.float32),
+        albedo_high=np.full(faces, albedo, np.float32),
+        retro=np.full(faces, retro, np.float32),
+        emission=np.full(faces, emission, np.float32),
+    )
+
+
+def joined(*meshes: Mesh) -> Mesh:
+    """Several meshes as one."""
+    names = ("corners", "uv", "albedo_low", "albedo_high", "retro", "emission")
+    return Mesh(*(np.concatenate([getattr(part, name) for part in meshes]) for name in names))
+
+
+def world(
+    static: Mesh,
+    *,
+    light: Light = DARK,
+    moving: tuple[MovingObject, ...] = (),
+    height_m: float = 1.0,
+    pitch_rad: float = 0.0,
+    speed_m_s: float = 0.0,
+) -> World:
+    """A world seen from (0, 0, height), looking ahead."""
+    ego = Motion(Pose((0.0, 0.0, height_m), 0.0, pitch_rad), speed_m_s)
+    return World("garage", 0, static, moving, light, ego)
+
+
+def at(*times_s: float) -> Instants:
+    """Instants at which everything is rendered, with the same random numbers."""
+    everywhere = (True,) * len(times_s)
+    return Instants(times_s, everywhere, everywhere, (0,) * len(times_s))
+
+
+def ray_directions(camera: CameraConfig) -> np.ndarray:
+    """Unit directions [H, W, 3] through the pixels' centres of a camera that looks along x."""
+    across = math.tan(math.radians(camera.horizontal_fov_deg / 2))
+    left = across * (1 - 2 * (np.arange(camera.width) + 0.5) / camera.width)
+    up = across * (camera.height - 2 * np.arange(camera.height) - 1) / camera.width
+    ray = np.stack(np.broadcast_arrays(1.0, left[None, :], up[:, None]), axis=-1)
+    return ray / np.linalg.norm(ray, axis=-1, keepdims=True)
+
+
+def solid_angle_sr(camera: CameraConfig, steps: int = 2000) -> float:
+    """Solid angle of the field of view, by summing cos^3 over the image plane."""
+    across = math.tan(math.radians(camera.horizontal_fov_deg / 2))
+    down = across * camera.height / camera.width
+    y = (np.arange(steps) + 0.5) / steps * 2 * across - across
+    z = (np.arange(steps) + 0.5) / steps * 2 * down - down
+    area = (2 * across / steps) * (2 * down / steps)
+    return float(((1 + y[:, None] ** 2 + z[None, :] ** 2) ** -1.5).sum() * area)
