@@ -83,11 +83,11 @@ def problem(arguments: Namespace) -> int:
         split: open_problem(config.env.model_copy(update={"split": split})) for split in counts
     }
     with progress(frames, "playing every action in every frame", "frame") as bar:
-        possible = [
+        validation, test = (
             tabulate(problems[split], drive_seeds(config.study, count), tick=bar.update)
             for split, count in counts.items()
-        ]
-    found = measure_problem(*possible, config.env.reward, config.study)
+        )
+    found = measure_problem(validation, test, config.env.reward, config.study)
     print_problem(found, config.study.confidence)
     _write_json(arguments, found)
     return DONE

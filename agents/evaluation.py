@@ -107,7 +107,8 @@ def play_drives(
     tick : callable
         Told the number of frames driven after each step.
     """
-    observations, infos = envs.reset(seed=list(seeds))
+    one_each: Any = list(seeds)  # gymnasium's annotation forgets sequences
+    observations, infos = envs.reset(seed=one_each)
     policy.reset()
     frames: list[dict[str, np.ndarray]] = []
     done = np.zeros(len(seeds), dtype=bool)

@@ -71,7 +71,7 @@ def measure_problem(
     table = test.table(weights)
     best = clairvoyant(table)
     rivals = _rivals(validation.table(weights), table)
-    found = {
+    found: dict[str, dict[str, Any]] = {
         name: {
             "choice": choice,
             **_interval(excess, study, played.cost, best.cost, name="excess"),

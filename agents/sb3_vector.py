@@ -39,7 +39,9 @@ class Sb3VecEnv(VecEnv):
     def reset(self) -> Any:
         """Start all environments anew; seeds given by `seed` count once."""
         seeded = any(seed is not None for seed in self._seeds)
-        observations, infos = self.envs.reset(seed=list(self._seeds) if seeded else None)
+        # A sequence with one seed per environment; gymnasium's annotation forgets it.
+        seeds: Any = list(self._seeds) if seeded else None
+        observations, infos = self.envs.reset(seed=seeds)
         self.reset_infos = split_infos(infos, self.num_envs)
         self._reset_seeds()
         self._reset_options()

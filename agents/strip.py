@@ -35,8 +35,8 @@ def take_strip(problem: Problem, played: Played) -> Strip:
         depth_mae_m=played.depth_mae_m[where],
         family=played.family[where],
         drive=played.seeds[where[0]],
-        unambiguous_m=np.float64(unambiguous_range_m(problem.config.sensor.f1_hz)),
-        max_range_m=np.float64(problem.config.sensor.max_range_m),
+        unambiguous_m=np.asarray(unambiguous_range_m(problem.config.sensor.f1_hz)),
+        max_range_m=np.asarray(problem.config.sensor.max_range_m),
     )
 
 
