@@ -7,6 +7,7 @@ import math
 import torch
 from torch import Tensor
 
+from unwrap.merge import above_zero
 from unwrap.phase import distance_m, unambiguous_range_m
 
 
@@ -44,16 +45,15 @@ def unwrap_dual(
     wrapped1_m, wrapped2_m = distance_m(phase1_rad, f1_hz), distance_m(phase2_rad, f2_hz)
     # Disagreements are held in wraps of f2, where the nearest candidate is a rounding away.
     gap = (wrapped1_m - wrapped2_m).mul_(1 / range2_m)
-    best = gap - gap.round()
-    wraps = torch.zeros_like(gap)
+    best, wraps = gap - gap.round(), torch.zeros_like(gap)
     for n in range(1, math.floor(max_range_m / range1_m) + 1):
         shifted = gap + n * range1_m / range2_m
-        shifted -= shifted.round()
-        better = shifted.abs() < best.abs()
+        shifted.sub_(shifted.round())
+        better = above_zero(best.abs().sub_(shifted.abs()))
         if (n + 1) * range1_m > max_range_m:
-            better &= wrapped1_m <= max_range_m - n * range1_m
-        best = torch.where(better, shifted, best)
-        wraps.masked_fill_(better, n)
+            better.mul_(above_zero(max_range_m - n * range1_m - wrapped1_m))
+        best.lerp_(shifted, better)
+        wraps.lerp_(torch.full_like(wraps, n), better)
     share2 = f2_hz**2 / (f1_hz**2 + f2_hz**2)
     fused_m = wrapped1_m.add_(wraps, alpha=range1_m).sub_(best, alpha=share2 * range2_m)
     return fused_m.clamp_(min=0), best.abs_().mul_(range2_m)

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from torch import Tensor
 
 from unwrap.acquisition import Shots
-from unwrap.correction import MERGES, Prediction, SensorDescription, correct
+from unwrap.correction import MERGES, Merge, Prediction, SensorDescription, correct
 from unwrap.frames import RawFrame
 from unwrap.metrics import depth_metrics
 from unwrap.phase import decode, distance_m, unambiguous_range_m
@@ -72,7 +72,7 @@ def evaluate(
     return scores
 
 
-def _methods(shots: Shots) -> dict[str, str | None]:
+def _methods(shots: Shots) -> dict[str, Merge | None]:
     """Merge rule by name of method; None is the wrapped map as it is."""
     if shots == Shots.EIGHT:
         return {"8 DCS": "nearest"}

@@ -79,12 +79,12 @@ def regression_loss(
     The paper scales depth maps to [0, 1]; `range_m` is the depth that becomes 1.
     """
     prediction, truth = prediction_m / range_m, truth_m / range_m
-    terms = (
-        scale_invariant_loss(prediction, truth, mean_share),
-        ssim_loss(prediction, truth),
-        depth_guided_loss(prediction, truth),
+    invariant, similar, guided = weights
+    return (
+        invariant * scale_invariant_loss(prediction, truth, mean_share)
+        + similar * ssim_loss(prediction, truth)
+        + guided * depth_guided_loss(prediction, truth)
     )
-    return sum(weight * term for weight, term in zip(weights, terms, strict=True))
 
 
 def wrap_loss(prediction_m: Tensor, truth_m: Tensor, unambiguous_m: float) -> Tensor:

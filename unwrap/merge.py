@@ -47,4 +47,13 @@ def _merged(
     wraps: Tensor, wrapped_m: Tensor, unambiguous_m: float, otherwise_m: Tensor, saturation_m: float
 ) -> Tensor:
     unwrapped_m = torch.add(wrapped_m, wraps, alpha=unambiguous_m)
-    return torch.where(wrapped_m < saturation_m, unwrapped_m, otherwise_m)
+    trusted = above_zero(saturation_m - wrapped_m)
+    return otherwise_m.to(unwrapped_m).lerp(unwrapped_m, trusted)
+
+
+def above_zero(values: Tensor) -> Tensor:
+    """1 where `values`, which are overwritten, are above 0, else 0.
+
+    Choosing by `lerp` with these weights is exact and several times faster than `torch.where`.
+    """
+    return values.sign_().clamp_(min=0)

@@ -8,6 +8,7 @@ scales all channels; 64 gives ResNet18's own.
 from __future__ import annotations
 
 from operator import add
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -133,7 +134,8 @@ def autocast(device: torch.device) -> torch.autocast:
     if device.type == "cuda":
         supported = torch.cuda.is_bf16_supported()
     else:
-        supported = getattr(torch.cpu, "get_capabilities", dict)().get("avx512_bf16", False)
+        capabilities: dict = getattr(torch.cpu, "get_capabilities", dict)()
+        supported = capabilities.get("avx512_bf16", False)
     return torch.autocast(device.type, torch.bfloat16, enabled=bool(supported))
 
 
@@ -142,7 +144,7 @@ def multiply_accumulates(network: nn.Module, height: int, width: int) -> int:
     """Multiply-accumulate operations of the convolutions of one frame of `height` x `width`."""
     counts = []
 
-    def count(layer: nn.Module, inputs: tuple[Tensor], output: Tensor) -> None:
+    def count(layer: Any, inputs: tuple[Tensor], output: Tensor) -> None:
         # Each weight is used once per output pixel, or per input pixel of a transposed layer.
         pixels = inputs[0] if isinstance(layer, nn.ConvTranspose2d) else output
         counts.append(layer.weight.numel() * pixels.shape[-2] * pixels.shape[-1])

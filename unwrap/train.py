@@ -20,6 +20,7 @@ import lightning
 import numpy as np
 import torch
 from lightning.pytorch.callbacks import ModelCheckpoint, TQDMProgressBar
+from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from pydantic import BaseModel, ConfigDict, Field
 from torch import Tensor
 from torch.nn import functional
@@ -156,7 +157,7 @@ class TrainingModule(lightning.LightningModule):
         super().__init__()
         self.config = config
         self.steps = steps
-        self.network = config.build().to(memory_format=torch.channels_last)
+        self.network = config.build().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def forward(self, gray: Tensor) -> Tensor:
         """gray [B, 1, H, W] in [0, 1] -> the network's output."""
@@ -179,7 +180,7 @@ class TrainingModule(lightning.LightningModule):
         accuracy = right.sum() / scored.sum().clamp(min=1)
         self.log("wrap_accuracy", accuracy, prog_bar=True, batch_size=len(gray))
 
-    def configure_optimizers(self) -> dict[str, Any]:
+    def configure_optimizers(self) -> OptimizerLRScheduler:
         """AdamW; the rate rises linearly over the warm-up, then falls linearly to the end."""
         config = self.config
         optimizer = torch.optim.AdamW(

@@ -109,5 +109,5 @@ def load_unwrapper(name_or_path: str | Path) -> Unwrapper:
     shipped = str(name_or_path) in NETWORKS
     path = SHIPPED / f"{name_or_path}.safetensors" if shipped else Path(name_or_path)
     weights = load_weights(path)
-    network = weights.network.to(memory_format=torch.channels_last)
+    network = weights.network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     return Unwrapper(weights.metadata["network"], network, weights.metadata, weights.fingerprint)
