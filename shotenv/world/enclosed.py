@@ -44,7 +44,7 @@ def garage(site: Site, rng: np.random.Generator, irradiance: Range) -> None:
         site.put(vehicles.car(rng), end - 1.2, rng.uniform(-0.5, 0.5), np.pi / 2)
     ceiling_lamps(site, rng, (-7.0, end), height, irradiance, (-aisle / 4, aisle / 4))
     crossing(site, rng, (-aisle / 2, aisle / 2), near=0.8)
-    walkers(site, rng, rng.integers(1, 3), (-aisle / 2 + 0.3, aisle / 2 - 0.3))
+    walkers(site, rng, (1, 3), (-aisle / 2 + 0.3, aisle / 2 - 0.3))
     if rng.random() < 0.35:
         x = rng.uniform(8.0, 20.0) + site.travel_m
         approaching_car(site, rng, Motion(Pose((x, aisle / 4, 0.0), np.pi), rng.uniform(0.5, 3.0)))
@@ -177,7 +177,7 @@ def tunnel(site: Site, rng: np.random.Generator, irradiance: Range) -> None:
     if rng.random() < 0.6:
         x = rng.uniform(6.0, 26.0) + 0.5 * site.travel_m
         approaching_car(site, rng, Motion(Pose((x, lane, 0.0), np.pi), rng.uniform(3.0, 14.0)))
-    walkers(site, rng, rng.integers(0, 2), (centre - half + 0.3, centre - half + 0.5), 0.15)
+    walkers(site, rng, (0, 2), (centre - half + 0.3, centre - half + 0.5), 0.15)
 
 
 def tube_section(rng: np.random.Generator, half: float) -> list[tuple[float, float]]:

@@ -83,7 +83,7 @@ def scaled(mesh: Mesh, factors: Point) -> Mesh:
     return replace(mesh, corners=mesh.corners * np.asarray(factors, dtype=np.float32))
 
 
-def polygon(points: Sequence[Point], material: Material) -> Mesh:
+def polygon(points: Sequence[Point] | np.ndarray, material: Material) -> Mesh:
     """A flat convex polygon, corners counter-clockwise seen from its front."""
     ring = np.asarray(points, dtype=np.float64)
     first = np.broadcast_to(ring[:1], (len(ring) - 2, 3))

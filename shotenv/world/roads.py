@@ -36,12 +36,12 @@ def country_road(site: Site, rng: np.random.Generator) -> None:
         site.build(meshes.patch((-BEHIND_M, far), y, 0.0, verge))
     oncoming(site, rng, lane)
     lead(site, rng)
-    walkers(site, rng, count=rng.integers(0, 3), y=(right - 1.5, right - 0.6))
+    walkers(site, rng, (0, 3), (right - 1.5, right - 0.6))
     cyclists(site, rng, right + 0.35)
     if rng.random() < 0.4:
         rail = furniture.guard_rail if rng.random() < 0.6 else furniture.jersey_barrier
-        y, length = right - 0.7, rng.uniform(12.0, 30.0)
-        site.put(rail(rng, length), site.travel_m / 2 + rng.uniform(6, 20), y, np.pi / 2)
+        length, x = rng.uniform(12.0, 30.0), site.travel_m / 2 + rng.uniform(6, 20)
+        site.put(rail(rng, length), x, right - 0.7, np.pi / 2)
     if rng.random() < 0.3:
         length = rng.uniform(6, 16)
         x = site.travel_m + rng.uniform(5, 15)
@@ -68,8 +68,8 @@ def town_street(site: Site, rng: np.random.Generator) -> None:
     lead(site, rng)
     oncoming(site, rng, lane)
     crossing(site, rng, (right + 0.3, left - 0.3))
-    walkers(site, rng, rng.integers(1, 4), (right - pavement + 0.5, right - 0.5), KERB_M)
-    walkers(site, rng, rng.integers(0, 3), (left + 0.5, left + pavement - 0.5), KERB_M)
+    walkers(site, rng, (1, 4), (right - pavement + 0.5, right - 0.5), KERB_M)
+    walkers(site, rng, (0, 3), (left + 0.5, left + pavement - 0.5), KERB_M)
     cyclists(site, rng, -lane / 2 - 0.1)
     row(site, rng, vehicles.car, right + parking / 2 + 0.05, 5.8, 0.0, share=rng.uniform(0.3, 0.9))
     if parking_left == parking:
@@ -99,7 +99,7 @@ def car_park(site: Site, rng: np.random.Generator) -> None:
             if rng.random() < 0.5:
                 site.put(vehicles.car(rng), x, y + rng.uniform(-0.2, 0.2), rng.integers(2) * np.pi)
     crossing(site, rng, (-4.0, 4.0), near=0.9)
-    walkers(site, rng, rng.integers(1, 4), (-6.0, 6.0))
+    walkers(site, rng, (1, 4), (-6.0, 6.0))
     row(site, rng, pavement_thing, 0.0, 2.5, 0.0, share=0.5, spread=5.0)
     street_lamps(site, rng, -rng.uniform(3, 6), 14.0)
 

@@ -19,11 +19,13 @@ STREET_IRRADIANCE = (1e-3, 2e-2)
 TRIES = 4
 
 
-def walkers(site: Site, rng: np.random.Generator, count: int, y: Range, z: float = 0.0) -> None:
-    """People who stand or walk along the road, either way."""
+def walkers(
+    site: Site, rng: np.random.Generator, count: tuple[int, int], y: Range, z: float = 0.0
+) -> None:
+    """People who stand or walk along the road, either way: at least count[0], below count[1]."""
     near = site.travel_m + 0.9
     far = max(near, min(near + 17.0, site.room[1, 0] - 0.5))
-    for _ in range(count):
+    for _ in range(rng.integers(*count)):
         speed = rng.uniform(0.7, 1.8) if rng.random() < 0.75 else 0.0
         somebody = people.person(rng, 0.4 * speed)
         for _ in range(TRIES):

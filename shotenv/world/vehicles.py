@@ -52,7 +52,8 @@ def van_shape(rng: np.random.Generator) -> CarShape:
         (-half, 0.42), (-half + 0.08, 0.30), (half - 0.12, 0.30), (half, 0.45),
         (half - 0.03, 0.80), (half - 0.55, 1.10), (-half, 1.12),
     ]  # fmt: skip
-    cabin = [(-half, 1.11), (half - 0.56, 1.09), (half - 1.05, height), (-half, height)]
+    rear = -half + 0.02
+    cabin = [(rear, 1.11), (half - 0.56, 1.09), (half - 1.05, height), (rear, height)]
     width = rng.uniform(1.85, 2.0)
     return CarShape(length, width, body, cabin, 0.95 * width, rng.uniform(0.32, 0.36))
 
