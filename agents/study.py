@@ -50,7 +50,7 @@ def make_envs(config: EnvConfig, split: str, count: int, mode: str) -> ShotSched
     from shotenv.vector_env import ShotScheduleVectorEnv
 
     fields = config.model_copy(update={"split": split}).model_dump()
-    return ShotScheduleVectorEnv(count, autoreset_mode=mode, **fields)
+    return ShotScheduleVectorEnv(count, autoreset_mode=mode, remember=True, **fields)
 
 
 def train_scheduler(config: DemoConfig, out: Path) -> PpoPolicy:

@@ -1,9 +1,9 @@
 """PPO training of a scheduler: interruptible, resumable, without pickle.
 
-Training runs in rounds of whole drives. A round starts every environment on a new drive, with
-seeds and a random state derived from the run's seed and the round's number alone; so what a round
-does is a function of the network, the optimiser and that number, and a resumed run equals an
-uninterrupted one.
+Training runs in rounds of whole drives. A round starts every environment on one of the training
+drives, chosen with a random state that derives from the run's seed and the round's number alone;
+so what a round does is a function of the network, the optimiser and that number, and a resumed
+run equals an uninterrupted one.
 """
 
 from __future__ import annotations
@@ -80,6 +80,8 @@ class Trainer:
         self._envs, self._config, self._validate, self._out = envs, config, validate, out
         self._ppo = build_ppo(envs, config)
         self.policy = PpoPolicy(self._ppo.policy, config, feature_names)
+        self._drives = np.random.SeedSequence(config.seed).generate_state(config.drives)
+        self._few = config.drives < config.num_envs
         updates = math.ceil(frames_per_drive / config.rollout_steps)
         self._round_steps = updates * config.rollout_steps * config.num_envs
         self._rounds = math.ceil(config.total_steps / self._round_steps)
@@ -107,11 +109,10 @@ class Trainer:
         return PpoPolicy.load(self._out)
 
     def _train_round(self, number: int, bar: tqdm) -> None:
-        words = np.random.SeedSequence((self._config.seed, number)).generate_state(
-            self._config.num_envs + 1
-        )
-        set_random_seed(int(words[0]))
-        self._envs.seed_all([int(word) for word in words[1:]])
+        generator = np.random.default_rng((self._config.seed, number))
+        set_random_seed(int(generator.integers(2**31)))
+        drives = generator.choice(self._drives, self._config.num_envs, replace=self._few)
+        self._envs.seed_all(drives.tolist())
         self._ppo._last_obs = None  # makes `learn` reset the environments
         self._ppo.num_timesteps = number * self._round_steps
         self._anneal(number)

@@ -202,6 +202,7 @@ class AgentConfig(Section):
     algorithm: Literal["ppo"] = Field("ppo", description="stable-baselines3 algorithm")
     total_steps: int = Field(100_000, ge=1, description="environment steps in all")
     num_envs: int = Field(16, ge=1, description="environments in the batch")
+    drives: int = Field(32, ge=1, description="different drives to train on, again and again")
     rollout_steps: int = Field(128, ge=2, description="steps of each environment per update")
     batch_size: int = Field(512, ge=2, description="steps per gradient batch")
     epochs: int = Field(10, ge=1, description="passes over a rollout")

@@ -9,7 +9,7 @@ features = observe(problem, state)
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -33,6 +33,8 @@ NEVER = 1000
 """Frames since an acquisition that has not been made."""
 RECENT_S = 1.0
 """Time constant of the averages of duty and power."""
+Look = Callable[[Problem, Drive, Tensor, Shots], Measured]
+"""Acquires the frames at a step of some drives."""
 
 
 @dataclass(frozen=True)
@@ -134,16 +136,20 @@ def reset(problem: Problem, seeds: Sequence[int]) -> State:
 
 
 @torch.inference_mode()
-def step(problem: Problem, state: State, actions: Tensor) -> tuple[State, Outcome]:
+def step(
+    problem: Problem, state: State, actions: Tensor, *, look: Look = measure
+) -> tuple[State, Outcome]:
     """Play one frame of every drive.
 
     Parameters
     ----------
     actions : int64 [B]
         0 = 2 DCS, 1 = 4 DCS, 2 = 8 DCS; a laser that is off takes none.
+    look : callable
+        `measure`, or something that gives the same faster (`shotenv.recall`).
     """
     shots = SHOTS_OF_ACTION[actions].masked_fill(state.tripped, 0)
-    score, features = _measure_by_shots(problem, state, shots)
+    score, features = _measure_by_shots(problem, state, shots, look)
     cost = cost_of(problem, state.drive, shots)
     terms = reward_terms(score, cost, state.drive.always_eight, state.tripped)
     following = advance(problem, state, cost, _remember(problem, state, shots, terms, features))
@@ -159,14 +165,16 @@ def step(problem: Problem, state: State, actions: Tensor) -> tuple[State, Outcom
     return following, outcome
 
 
-def _measure_by_shots(problem: Problem, state: State, shots: Tensor) -> tuple[DepthScore, Tensor]:
+def _measure_by_shots(
+    problem: Problem, state: State, shots: Tensor, look: Look
+) -> tuple[DepthScore, Tensor]:
     """Scores and remembered features; environments with the same shots are one batch."""
     score, features = no_depth(len(shots), problem.config.sensor.max_range_m), state.seen.features
     for count in sorted(set(shots.tolist()) - {0}):
         rows = (shots == count).nonzero().squeeze(1)
         everything = len(rows) == len(shots)
         drive = state.drive if everything else take(state.drive, rows)
-        measured = measure(problem, drive, state.step[rows], Shots(count))
+        measured = look(problem, drive, state.step[rows], Shots(count))
         told = keep_untold(measured.seen, features[rows], Shots(count))
         if everything:
             return measured.score, told

@@ -25,8 +25,10 @@ from shotenv.env import (
     reward_space,
 )
 from shotenv.info import reset_infos, step_infos
+from shotenv.measure import measure
 from shotenv.observe import FEATURES
 from shotenv.problem import open_problem
+from shotenv.recall import Recall
 from shotenv.resolve import env_config
 
 
@@ -41,6 +43,8 @@ class ShotScheduleVectorEnv(VectorEnv):
         As for `ShotScheduleEnv`.
     autoreset_mode
         "NextStep", "SameStep" or "Disabled", or gymnasium's enum.
+    remember
+        Keep what was measured: the same numbers, faster where drives come again.
     """
 
     def __init__(
@@ -50,6 +54,7 @@ class ShotScheduleVectorEnv(VectorEnv):
         *,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
+        remember: bool = False,
         **fields: Any,
     ) -> None:
         self.num_envs = _check_count(num_envs)
@@ -68,6 +73,7 @@ class ShotScheduleVectorEnv(VectorEnv):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.reward_space = reward_space()
         self.state: State | None = None
+        self._look = Recall() if remember else measure
         self._generators = [seeding.np_random()[0] for _ in range(num_envs)]
         self._over = np.zeros(num_envs, dtype=bool)
         self._shown: dict[int, tuple[State, int]] = {}
@@ -131,7 +137,7 @@ class ShotScheduleVectorEnv(VectorEnv):
         index, before = torch.from_numpy(rows), self._under_way()
         whole = len(rows) == self.num_envs
         part = before if whole else take(before, index)
-        after, outcome = step(self.problem, part, actions[index])
+        after, outcome = step(self.problem, part, actions[index], look=self._look)
         self.state = after if whole else put(before, index, after)
         self._over[rows] = outcome.truncated.numpy()
         self._show(rows, part, outcome.shots.tolist())
