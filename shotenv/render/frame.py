@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shotenv.config import CameraConfig, SensorConfig
 from shotenv.render.instants import frame_instants
 from shotenv.render.llvm import start_mitsuba
-from shotenv.world.model import World
 from unwrap.acquisition import Shots, demodulation_phase_rad, frequency_index
+
+if TYPE_CHECKING:  # Worker processes start without loading how worlds are drawn.
+    from shotenv.world.model import World
 
 
 @dataclass(frozen=True)

@@ -99,8 +99,8 @@ def _padding(world: World) -> list[Mesh]:
     if any(len(thing.mesh.corners) for thing in world.moving):
         return []
     zero = np.zeros(1, np.float32)
-    buried = np.float32(world.ego.start.position_m) - np.float32((0, 0, 10))
-    corners = np.broadcast_to(buried, (1, 3, 3))
+    buried = np.asarray(world.ego.start.position_m) - (0.0, 0.0, 10.0)
+    corners = np.broadcast_to(buried.astype(np.float32), (1, 3, 3))
     return [Mesh(corners, np.zeros((1, 3, 2), np.float32), zero, zero, zero, zero)]
 
 
