@@ -158,11 +158,11 @@ class RewardConfig(Section):
     """Weights of the bounded reward terms: r = -(sum of weight times term)."""
 
     error: NonNegative = Field(1.0, description="weight of the depth error term")
-    duty: NonNegative = Field(0.05, description="weight of laser duty relative to always-8")
-    power: NonNegative = Field(0.15, description="weight of power relative to always-8")
+    duty: NonNegative = Field(0.005, description="weight of laser duty relative to always-8")
+    power: NonNegative = Field(0.02, description="weight of power relative to always-8")
     trip: NonNegative = Field(0.5, description="weight of a frame without laser")
     error_scale_m: Positive = Field(
-        0.5, description="error at which a pixel's term |e| / (|e| + scale) is one half, m"
+        4.0, description="error at which a pixel's term |e| / (|e| + scale) is one half, m"
     )
 
 

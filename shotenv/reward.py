@@ -25,7 +25,8 @@ class DepthScore:
     Attributes
     ----------
     error : [B]
-        Mean of |e| / (|e| + scale); an invalid pixel counts as 1. In 0..1.
+        Mean of |e| / (|e| + scale) of the distance that is delivered, the best guess where it is
+        not valid; 1 where there is none. In 0..1.
     depth_mae_m, depth_rmse_m : [B]
         Over the valid ones; the scored range where there is none.
     wrap_accuracy : [B]
@@ -50,8 +51,8 @@ def frame_sums(*maps: Tensor) -> Tensor:
     return torch.stack([values.sum(dim=-1) for values in maps]).to(torch.float64).sum(dim=-1)
 
 
-FARTHEST_ERROR_M = 1e4
-"""Stands for the error where distance or truth is not finite; no such pixel is scored and valid."""
+FARTHEST_ERROR_M = 1e9
+"""Stands for the error where there is no distance: its term is 1 within the rounding of a float."""
 
 
 def score_depth(
@@ -76,7 +77,7 @@ def score_depth(
     sums = frame_sums(
         counted,
         good,
-        good_error_m / (error_m + error_scale_m),
+        error_m * counted / (error_m + error_scale_m),
         good_error_m,
         error_m.mul(good_error_m),
         error_m.lt_(0.5 * unambiguous_m).mul_(good),
@@ -86,9 +87,8 @@ def score_depth(
     divisor, good_divisor = scored_count.clamp(min=1), good_count.clamp(min=1)
     shares = torch.stack((good_count, right_count)) / divisor
     valid_share, wrap_accuracy = shares.masked_fill_(nothing, 1.0)
-    error = (bounded + scored_count - good_count) / divisor
     return DepthScore(
-        error=error,
+        error=bounded / divisor,
         depth_mae_m=(absolute_m / good_divisor).masked_fill_(none_good, range_m),
         depth_rmse_m=(squared_m2 / good_divisor).sqrt_().masked_fill_(none_good, range_m),
         wrap_accuracy=wrap_accuracy,

@@ -40,6 +40,7 @@ def score(distance, valid, truth, scored, scale=0.5):
 
 
 def test_score_by_hand():
+    """The third pixel's best guess is right, the fourth has none."""
     nan, inf = float("nan"), float("inf")
     found = score(
         [2.5, 9.0, 3.0, nan, 1.0],
@@ -47,7 +48,7 @@ def test_score_by_hand():
         [2.0, 2.0, 3.0, 4.0, inf],
         [True, True, True, True, False],
     )
-    assert found.error.item() == pytest.approx((0.5 + 7 / 7.5 + 1 + 1) / 4)
+    assert found.error.item() == pytest.approx((0.5 + 7 / 7.5 + 0 + 1) / 4)
     assert found.depth_mae_m.item() == pytest.approx((0.5 + 7) / 2)
     assert found.depth_rmse_m.item() == pytest.approx(((0.25 + 49) / 2) ** 0.5)
     assert found.wrap_accuracy.item() == pytest.approx(1 / 4)

@@ -10,6 +10,7 @@ from safetensors.torch import load_file, save_file
 from unwrap.correction import Prediction, SensorDescription, correct
 from unwrap.frames import RawFrame
 from unwrap.nets import TofRegNet, TofSegNet
+from unwrap.phase import unambiguous_range_m
 from unwrap.unwrapper import load_unwrapper
 from unwrap.weights import save_weights
 
@@ -187,14 +188,29 @@ def test_invalid_pixels_hold_the_prediction_or_nan(truth):
     raw = raw_frame(truth, 8)
     raw.saturated[0, 0, 0] = True
     raw.dcs_lsb[0, :, 0, 1] *= 0.001
-    raw.dcs_lsb[0, 4:, 0, 2] = raw_frame(truth + 1.2, 8).dcs_lsb[0, 4:, 0, 2]
     guessed = correct(raw, guess(torch.full(truth.shape, 9.0)), SENSOR)
-    assert guessed.valid.sum() == truth.numel() - 3
-    assert guessed.distance_m[0, 0, :3].tolist() == [9.0] * 3
-    assert guessed.wraps[0, 0, :3].tolist() == [1] * 3
+    assert guessed.valid.sum() == truth.numel() - 2
+    assert guessed.distance_m[0, 0, :2].tolist() == [9.0] * 2
+    assert guessed.wraps[0, 0, :2].tolist() == [1] * 2
     unknown = correct(raw, None, SENSOR)
-    assert unknown.distance_m[0, 0, :3].isnan().all()
+    assert unknown.distance_m[0, 0, :2].isnan().all()
     assert torch.equal(unknown.valid, guessed.valid)
+
+
+def test_where_the_frequencies_disagree_the_prediction_decides(truth):
+    raw = raw_frame(truth, 8)
+    raw.dcs_lsb[0, 4:, 0, 2] = raw_frame(truth + 1.2, 8).dcs_lsb[0, 4:, 0, 2]
+    unambiguous = unambiguous_range_m(SENSOR.f1_hz)
+    second_wrap = guess(truth.float() + unambiguous)
+    frame = correct(raw, second_wrap, SENSOR)
+    expected = truth[0, 0, 2].item() + unambiguous
+    assert frame.distance_m[0, 0, 2].item() == pytest.approx(expected, abs=1e-3)
+    assert frame.valid.all()
+    others = torch.ones_like(truth, dtype=torch.bool)
+    others[0, 0, 2] = False
+    torch.testing.assert_close(frame.distance_m[others], truth.float()[others], rtol=0, atol=1e-3)
+    alone = correct(raw, None, SENSOR)
+    assert not alone.valid[0, 0, 2] and alone.valid[others].all()
 
 
 def test_noise_map_decides_what_is_valid(truth):

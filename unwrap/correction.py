@@ -1,7 +1,7 @@
 """Correction: raw samples and a network's prediction to unwrapped depth.
 
 Two or four samples are decoded and merged with the prediction; eight are unwrapped by their two
-frequencies and need no prediction.
+frequencies, and need the prediction only where these disagree.
 """
 
 from __future__ import annotations
@@ -43,8 +43,9 @@ class SensorDescription:
     min_snr : float
         Amplitude over noise below which a pixel is invalid.
     max_residual_m : float
-        Disagreement of the two frequencies above which a pixel is invalid. With 24 and 10 MHz
-        candidates within 25 m lie 2.5 m apart, so that 1.25 m is the most there is.
+        Disagreement of the two frequencies above which they are not trusted: the pixel is merged
+        with the prediction, or invalid without one. With 24 and 10 MHz candidates within 25 m lie
+        2.5 m apart, so that 1.25 m is the most there is.
     """
 
     f1_hz: float = 24e6
@@ -119,17 +120,29 @@ def correct(
             sensor.f2_hz,
             max_range_m=sensor.max_range_m,
         )
-        valid &= residual_m <= sensor.max_residual_m
+        agree = residual_m <= sensor.max_residual_m
+        if prediction is not None:
+            guess_m = _merged(first, prediction, sensor, merge)
+            merged_m = guess_m.lerp_(merged_m, agree.to(merged_m.dtype))
+        else:
+            valid &= agree
     elif prediction is None:
         raise ValueError(f"prediction is None; {int(raw.shots)} samples cannot be unwrapped alone")
     else:
-        merged_m = MERGES[merge](
-            prediction.distance_m,
-            distance_m(first.phase_rad, sensor.f1_hz),
-            unambiguous_range_m(sensor.f1_hz),
-            sensor.saturation_range_m,
-        )
+        merged_m = _merged(first, prediction, sensor, merge)
     return _frame(merged_m, valid, first, prediction, sensor)
+
+
+def _merged(
+    first: PhaseFrame, prediction: Prediction, sensor: SensorDescription, merge: Merge
+) -> Tensor:
+    """The first frequency's wrapped map, unwrapped by the prediction."""
+    return MERGES[merge](
+        prediction.distance_m,
+        distance_m(first.phase_rad, sensor.f1_hz),
+        unambiguous_range_m(sensor.f1_hz),
+        sensor.saturation_range_m,
+    )
 
 
 def _frame(
