@@ -8,8 +8,8 @@ from typing import Any
 from jsonargparse import Namespace
 
 from agents.files import write_json
-from agents.progress import progress, say
 from shotenv.config import BankConfig, DemoConfig
+from shotenv.progress import progress, say
 
 DONE, FAILED = 0, 1
 
@@ -34,9 +34,11 @@ def demo(arguments: Namespace) -> int:
 
 def train(arguments: Namespace) -> int:
     """Train a scheduler."""
-    from agents.study import train_scheduler
+    from agents.study import make_ready, train_scheduler
 
-    train_scheduler(_experiment(arguments), arguments.out)
+    config = _experiment(arguments)
+    make_ready(config.env)
+    train_scheduler(config, arguments.out)
     print(f"The scheduler is in {arguments.out}; `shotenv evaluate {arguments.out}` judges it.")
     return DONE
 
@@ -44,10 +46,11 @@ def train(arguments: Namespace) -> int:
 def evaluate(arguments: Namespace) -> int:
     """Judge a trained scheduler."""
     from agents.policies import PpoPolicy
-    from agents.study import evaluate_scheduler
+    from agents.study import evaluate_scheduler, make_ready
 
-    scheduler = PpoPolicy.load(arguments.scheduler)
-    results = evaluate_scheduler(_experiment(arguments), scheduler, arguments.out)
+    scheduler, config = PpoPolicy.load(arguments.scheduler), _experiment(arguments)
+    make_ready(config.env)
+    results = evaluate_scheduler(config, scheduler, arguments.out)
     return _report(arguments, results)
 
 
@@ -73,10 +76,12 @@ def problem(arguments: Namespace) -> int:
     """Measure the decision problem."""
     from agents.evaluation import drive_seeds
     from agents.problem import measure_problem, print_problem
+    from agents.study import make_ready
     from agents.tables import tabulate
     from shotenv.core import open_problem
 
     config = _experiment(arguments)
+    make_ready(config.env)
     counts = {"validation": config.study.tuning_drives, "test": config.study.drives}
     frames = sum(counts.values()) * config.env.frames_per_drive
     problems = {

@@ -26,7 +26,6 @@ from agents.policies import (
     SnrThresholdPolicy,
 )
 from agents.problem import tuned_rule
-from agents.progress import progress, say
 from agents.results import (
     DRIVES,
     FRAMES,
@@ -37,6 +36,7 @@ from agents.results import (
     write_strip,
 )
 from shotenv.config import DemoConfig, EnvConfig
+from shotenv.progress import progress, say
 
 if TYPE_CHECKING:
     from shotenv.vector_env import ShotScheduleVectorEnv
@@ -51,6 +51,20 @@ def make_envs(config: EnvConfig, split: str, count: int, mode: str) -> ShotSched
 
     fields = config.model_copy(update={"split": split}).model_dump()
     return ShotScheduleVectorEnv(count, autoreset_mode=mode, remember=True, **fields)
+
+
+def make_ready(config: EnvConfig) -> None:
+    """Render the bank and compute the network's predictions where they do not stand yet.
+
+    From then on one thread serves: maps of some ten thousand pixels gain nothing from more, which
+    would only wait for each other.
+    """
+    import torch
+
+    from shotenv.core import open_problem
+
+    open_problem(config.model_copy(update={"split": "all"}))
+    torch.set_num_threads(1)
 
 
 def train_scheduler(config: DemoConfig, out: Path) -> PpoPolicy:
@@ -165,11 +179,8 @@ def _drive_to_show(played: Played) -> int:
 
 def run_demo(config: DemoConfig, out: Path) -> dict[str, Any]:
     """Render, tune, train, evaluate; returns the results that were written to `out`."""
-    from shotenv.core import open_problem
-
     say(f"1/4  Bank '{config.env.bank}' and the network's predictions for it")
-    for split in ("train", "validation", "test"):
-        open_problem(config.env.model_copy(update={"split": split}))
+    make_ready(config.env)
     say(f"2/4  PPO scheduler, {config.agent.total_steps} steps")
     scheduler = train_scheduler(config, out / "agent")
     say("3/4  Baselines and test drives")

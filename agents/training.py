@@ -26,9 +26,9 @@ from tqdm import tqdm
 
 from agents.files import write_bytes
 from agents.policies import PpoPolicy, first_line, network_arguments
-from agents.progress import progress
 from agents.sb3_vector import Sb3VecEnv
 from shotenv.config import AgentConfig
+from shotenv.progress import progress
 
 CHECKPOINT: Final = "checkpoint.safetensors"
 SCHEMA: Final = "1"

@@ -18,11 +18,11 @@ from pathlib import Path
 import numpy as np
 import torch
 from torch import Tensor
-from tqdm import tqdm
 
 from shotenv.bank import Bank
 from shotenv.bank.build import cache_dir
 from shotenv.bank.store import sha256_of, write_json
+from shotenv.progress import progress
 from unwrap.unwrapper import Prediction, Unwrapper
 
 ARRAYS = ("distance_m", "confidence")
@@ -98,7 +98,7 @@ def _compute(folder: Path, bank: Bank, unwrapper: Unwrapper) -> None:
 def _predict_all(bank: Bank, unwrapper: Unwrapper) -> tuple[np.ndarray, np.ndarray]:
     shape = (len(bank), bank.height, bank.width)
     distance_m, confidence = np.empty(shape, np.float16), np.empty(shape, np.float16)
-    with tqdm(total=len(bank), desc=f"{unwrapper.name} predicts", unit="frame", delay=1) as bar:
+    with progress(len(bank), f"{unwrapper.name} predicts", "frame") as bar:
         for index in range(len(bank)):
             prediction = unwrapper.predict(bank.gray(torch.tensor([index])))
             distance_m[index] = prediction.distance_m[0].numpy()

@@ -66,10 +66,10 @@ def open_problem(config: EnvConfig) -> Problem:
         The bank or the network is missing or damaged, or the bank was rendered for a sensor with
         other frequencies or timing.
     """
+    unwrapper = load_unwrapper(config.unwrapper)  # First: a bank may take minutes to render.
     bank = open_bank(config.bank)
     check_fits(bank, config.sensor)
     clips = bank.splits(config.split)
-    unwrapper = load_unwrapper(config.unwrapper)
     kept = keep_predictions(bank, unwrapper)
     return Problem(
         config=config,

@@ -93,8 +93,8 @@ def correct(
     prediction : Prediction or None
         Coarse distance of the same frames. None is allowed with eight samples.
     merge : "nearest" or "floor"
-        The nearest wrap candidate, ours, or eq. 6. For TofSegNet, which predicts the middle of a
-        wrap, both are eq. 8, with the middle of the class where the sensor saturates.
+        The nearest wrap candidate, ours, or eq. 6. For TofSegNet, whose prediction lies within
+        its likeliest class, "floor" is eq. 8, with the prediction where the sensor saturates.
     offset_lsb : float [H, W] or [B, H, W], optional
         Stored dark-offset map.
     noise_lsb : float or float [B, H, W], optional

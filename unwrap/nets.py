@@ -197,3 +197,18 @@ class TofSegNet(Autoencoder):
     def forward(self, gray: Tensor) -> Tensor:
         """gray [B, 1, H, W] in [0, 1] -> logits [B, classes, H, W]."""
         return super().forward(gray).float()
+
+
+def class_depth_m(logits: Tensor, unambiguous_m: float) -> Tensor:
+    """Coarse distance [B, H, W] that wrap-class logits [B, classes, H, W] stand for, metres.
+
+    The expectation over the classes' middles, kept within the likeliest class: eq. 8's floor gives
+    that class, and where two classes are about as likely the distance lies at their boundary, so
+    that the nearest candidate is right on either side of it.
+    """
+    probability = logits.float().softmax(1)
+    likeliest = probability.argmax(1)
+    middles = torch.arange(logits.shape[1], device=logits.device) + 0.5
+    expected = torch.einsum("bchw,c->bhw", probability, middles)
+    # A margin of a millionth keeps rounding from leaving the class.
+    return expected.clamp(likeliest + 1e-6, likeliest + (1 - 1e-6)) * unambiguous_m

@@ -29,7 +29,7 @@ from torch.utils.data import DataLoader
 from unwrap.data import Augmentation, BankFrames, EpochShuffle
 from unwrap.losses import EQUATION_7, regression_loss, wrap_loss
 from unwrap.merge import nearest_wraps
-from unwrap.nets import Autoencoder, TofRegNet, TofSegNet, autocast
+from unwrap.nets import Autoencoder, TofRegNet, TofSegNet, autocast, class_depth_m
 from unwrap.phase import unambiguous_range_m
 from unwrap.unwrapper import load_unwrapper
 from unwrap.weights import save_weights, write_atomically
@@ -144,10 +144,10 @@ def loss_of(output: Tensor, depth_m: Tensor, config: TrainConfig) -> Tensor:
 
 
 def predicted_depth_m(output: Tensor, config: TrainConfig) -> Tensor:
-    """Depth [B, H, W] of a network's output: itself, or the middle of the likeliest class."""
+    """Depth [B, H, W] of a network's output: itself, or what its classes stand for."""
     if config.network == "tofregnet":
         return output
-    return (output.argmax(1) + 0.5) * config.unambiguous_m
+    return class_depth_m(output, config.unambiguous_m)
 
 
 class TrainingModule(lightning.LightningModule):

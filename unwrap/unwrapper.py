@@ -10,7 +10,14 @@ from torch import Tensor
 
 from unwrap.correction import Merge, Prediction, SensorDescription, correct
 from unwrap.data import GRAY_FULL_SCALE
-from unwrap.nets import NETWORKS, Autoencoder, TofSegNet, autocast, multiply_accumulates
+from unwrap.nets import (
+    NETWORKS,
+    Autoencoder,
+    TofSegNet,
+    autocast,
+    class_depth_m,
+    multiply_accumulates,
+)
 from unwrap.phase import unambiguous_range_m
 from unwrap.weights import load_weights
 
@@ -49,9 +56,10 @@ class Unwrapper:
     def predict(self, gray: Tensor) -> Prediction:
         """Coarse distance from gray images [B, H, W]: uint16 in 0..4095, or float in [0, 1].
 
-        TofSegNet predicts the middle of its likeliest class, with that class's probability as
-        confidence. TofRegNet's confidence is the distance from its prediction to the nearest wrap
-        boundary over half the unambiguous range: 0 on a boundary, 1 halfway between two.
+        TofSegNet predicts a distance within its likeliest class (see `nets.class_depth_m`), with
+        that class's probability as confidence. TofRegNet's confidence is the distance from its
+        prediction to the nearest wrap boundary over half the unambiguous range: 0 on a boundary,
+        1 halfway between two.
 
         Frames are computed one by one, so that a prediction does not depend on its batch.
 
@@ -68,8 +76,8 @@ class Unwrapper:
         return self._classes(output) if isinstance(self.network, TofSegNet) else self._depth(output)
 
     def _classes(self, logits: Tensor) -> Prediction:
-        confidence, classes = logits.softmax(1).max(1)
-        return Prediction((classes + 0.5) * self.unambiguous_m, confidence)
+        confidence = logits.float().softmax(1).amax(1)
+        return Prediction(class_depth_m(logits, self.unambiguous_m), confidence)
 
     def _depth(self, depth_m: Tensor) -> Prediction:
         cycles = depth_m / self.unambiguous_m

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import sha256
@@ -14,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import torch
 from filelock import FileLock
-from tqdm import tqdm
 
 from shotenv.bank.store import (
     ARRAYS,
@@ -29,6 +27,7 @@ from shotenv.bank.store import (
     write_manifest,
 )
 from shotenv.config import BankConfig, Family
+from shotenv.progress import progress, say
 
 RENDERING_VERSION = 1
 """Raised when the same configuration would give other light: old banks are then left alone."""
@@ -182,12 +181,10 @@ def _announce(config: BankConfig, folder: Path, clips: int, missing: int) -> Non
     rays *= 8 + camera.gray_instants
     cores = len(os.sched_getaffinity(0))
     minutes = rays / 1e6 * SECONDS_PER_MILLION_RAYS * camera.bounces / 2 / cores / 60
-    print(
+    say(
         f"Rendering bank '{config.name}' into {folder}: {missing} of {clips} clips, "
         f"{frames} frames, {needed / 1e6:.0f} MB, about {max(minutes, 0.1):.1f} minutes on "
         f"{cores} cores. It can be interrupted; the next start continues.",
-        file=sys.stderr,
-        flush=True,
     )
 
 
@@ -199,9 +196,7 @@ def _render(jobs: Sequence[ClipJob], config: BankConfig, workers: int) -> None:
 
     require_llvm()
     frames = config.world.frames_per_clip
-    with tqdm(
-        total=len(jobs) * frames, unit="frame", desc="rendering", mininterval=1.0, maxinterval=5.0
-    ) as bar:
+    with progress(len(jobs) * frames, "rendering", "frame") as bar:
         jobs_per_worker = max(1, FRAMES_PER_WORKER // frames)
         for _ in run_jobs(render_clip, jobs, workers=workers, jobs_per_worker=jobs_per_worker):
             bar.update(frames)
