@@ -2,7 +2,15 @@ import pytest
 import torch
 from torch import nn
 
-from unwrap.nets import STRIDE, TofRegNet, TofSegNet, convolution, multiply_accumulates, pad
+from unwrap.nets import (
+    STRIDE,
+    TofRegNet,
+    TofSegNet,
+    class_depth_m,
+    convolution,
+    multiply_accumulates,
+    pad,
+)
 from unwrap.weights import build
 
 
@@ -75,3 +83,20 @@ def test_multiply_accumulates_of_known_layers():
     convolved, transposed = 8 * 10 * 6 * 9, 8 * 10 * 6 * 5 * 4
     assert multiply_accumulates(layers, 16, 20) == convolved + transposed
     assert multiply_accumulates(convolution(1, 2), 4, 4) == 16 * 2 * 9
+
+
+@pytest.mark.parametrize(
+    ("probability", "expected"),
+    [
+        ([1.0, 0.0, 0.0], 0.5),  # certain: the middle of the class
+        ([0.5, 0.5, 0.0], 1.0),  # between two: their boundary
+        ([0.2, 0.7, 0.1], 1.4),
+        ([0.6, 0.0, 0.4], 1.0),  # kept within the likeliest class
+        ([0.25, 0.25, 0.5], 2.0),
+    ],
+)
+def test_class_depth_is_the_expectation_within_the_likeliest_class(probability, expected):
+    logits = torch.tensor(probability).clamp(min=1e-12).log()[None, :, None, None]
+    depth = class_depth_m(logits + 3.0, unambiguous_m=6.25)
+    assert depth.shape == (1, 1, 1)
+    assert depth.item() == pytest.approx(6.25 * expected, abs=1e-4)

@@ -63,8 +63,8 @@ def test_prediction_is_that_of_the_network(path):
     if unwrapper.name == "tofregnet":
         assert (prediction.distance_m - output).abs().mean() < 0.1
     else:
-        middle = (output.argmax(1) + 0.5) * RANGE_M
-        assert ((prediction.distance_m - middle).abs() < 1e-4).float().mean() > 0.95
+        likeliest = (prediction.distance_m / RANGE_M).long()
+        assert (likeliest == output.argmax(1)).float().mean() > 0.95
 
 
 def test_prediction_does_not_depend_on_the_batch(path):
