@@ -103,36 +103,30 @@ def acquire(
 ) -> RawFrame:
     """Noise, full well and converter for charge that is known to be sound; see `expose`."""
     mean_e = (electrons.active_e + electrons.ambient_e).mul_(0.5)
-    half_scale = electrons.per_correlation_e * (0.5 * sensor.contrast)
-    pattern_lsb = fixed_pattern_lsb(electrons.ambient_e, sensor, offsets)
-    dcs_lsb = torch.empty_like(electrons.correlation[:, :shots])
-    fullest_e = torch.zeros_like(mean_e)
-    # One sample at a time keeps the working set in the processor's cache.
-    for k in range(shots):
-        taps_e = tap_electrons(mean_e, electrons.correlation[:, k] * half_scale)
-        if noise is not None:
-            taps_e = add_noise(taps_e, noise[:, k], sensor.read_noise_e)
-        torch.maximum(fullest_e, taps_e[:, 0], out=fullest_e)
-        torch.maximum(fullest_e, taps_e[:, 1], out=fullest_e)
-        dcs_lsb[:, k] = read_out(taps_e, pattern_lsb, sensor)
-    return RawFrame(dcs_lsb, _saturated(fullest_e, dcs_lsb, sensor))
-
-
-def read_out(taps_e: Tensor, pattern_lsb: Tensor | float, sensor: SensorConfig) -> Tensor:
-    """Signed words [B, H, W] of one sample from its taps [B, 2, H, W], electrons.
-
-    Each tap clips at its full well *before* the difference; then gain, offset, rounding and the
-    converter's range.
-    """
+    half_scale = (electrons.per_correlation_e * (0.5 * sensor.contrast)).unsqueeze(1)
+    taps_e = tap_electrons(mean_e.unsqueeze(1), electrons.correlation[:, :shots] * half_scale)
+    if noise is not None:
+        taps_e = add_noise(taps_e, noise[:, :shots], sensor.read_noise_e)
     held_e = clip_to_full_well(taps_e, sensor.full_well_e)
-    analogue_lsb = (held_e[:, 0] - held_e[:, 1]).mul_(sensor.gain_lsb_per_e).add_(pattern_lsb)
+    pattern_lsb = fixed_pattern_lsb(electrons.ambient_e, sensor, offsets)
+    dcs_lsb = read_out(held_e, pattern_lsb, sensor)
+    return RawFrame(dcs_lsb, _saturated(held_e, dcs_lsb, sensor))
+
+
+def read_out(held_e: Tensor, pattern_lsb: Tensor, sensor: SensorConfig) -> Tensor:
+    """Signed words [B, n, H, W] of the charge that the taps hold, [B, n, 2, H, W] electrons.
+
+    The taps' difference, then gain, offset, rounding and the converter's range.
+    """
+    analogue_lsb = (held_e[:, :, 0] - held_e[:, :, 1]).mul_(sensor.gain_lsb_per_e)
+    analogue_lsb.add_(pattern_lsb)
     return digitise(analogue_lsb, *signed_limits_lsb(sensor.adc_bits))
 
 
-def _saturated(fullest_e: Tensor, dcs_lsb: Tensor, sensor: SensorConfig) -> Tensor:
+def _saturated(held_e: Tensor, dcs_lsb: Tensor, sensor: SensorConfig) -> Tensor:
     """Where the fullest tap was full, or a word is at a limit of the converter's range."""
     low, high = signed_limits_lsb(sensor.adc_bits)
-    beyond = fullest_e.sub(sensor.full_well_e)
+    beyond = held_e.amax(dim=(1, 2)).sub_(sensor.full_well_e)
     torch.maximum(beyond, dcs_lsb.amax(dim=1).sub_(high), out=beyond)
     torch.maximum(beyond, dcs_lsb.amin(dim=1).neg_().add_(low), out=beyond)
     return beyond.ge_(0.0).bool()
@@ -140,11 +134,11 @@ def _saturated(fullest_e: Tensor, dcs_lsb: Tensor, sensor: SensorConfig) -> Tens
 
 def fixed_pattern_lsb(
     ambient_e: Tensor, sensor: SensorConfig, offsets: OffsetPattern | None
-) -> Tensor | float:
-    """Offset added to every sample: the taps' pattern and what ambient adds; 0 without offsets."""
+) -> Tensor:
+    """Offset [B, 1, H, W] of every sample: the taps' pattern and what ambient adds; or 0."""
     if offsets is None:
-        return 0.0
-    return ambient_offset_lsb(ambient_e, sensor).add_(offsets.pattern_lsb)
+        return ambient_e.new_zeros(())
+    return ambient_offset_lsb(ambient_e, sensor).add_(offsets.pattern_lsb).unsqueeze(1)
 
 
 def single_sample_snr(electrons: Electrons, sensor: SensorConfig) -> Tensor:

@@ -38,20 +38,20 @@ def tap_electrons(mean_e: Tensor, half_modulated_e: Tensor) -> Tensor:
 
     Parameters
     ----------
-    mean_e : [B, H, W]
+    mean_e : [B, 1, H, W]
         Half of the electrons over both taps, (S + B) / 2.
-    half_modulated_e : [B, H, W]
+    half_modulated_e : [B, n, H, W]
         Half of the demodulated electrons, m C_k / 2.
 
     Returns
     -------
-    [B, 2, H, W]
+    [B, n, 2, H, W]
         Electrons of tap A and tap B, not negative.
     """
-    batch, height, width = mean_e.shape
-    taps = mean_e.new_empty(batch, 2, height, width)
-    torch.add(mean_e, half_modulated_e, out=taps[:, 0])
-    torch.sub(mean_e, half_modulated_e, out=taps[:, 1])
+    batch, samples, height, width = half_modulated_e.shape
+    taps = mean_e.new_empty(batch, samples, 2, height, width)
+    torch.add(mean_e, half_modulated_e, out=taps[:, :, 0])
+    torch.sub(mean_e, half_modulated_e, out=taps[:, :, 1])
     return taps.clamp_(min=0.0)
 
 
