@@ -169,17 +169,24 @@ def _measure_by_shots(
     problem: Problem, state: State, shots: Tensor, look: Look
 ) -> tuple[DepthScore, Tensor]:
     """Scores and remembered features; environments with the same shots are one batch."""
-    score, features = no_depth(len(shots), problem.config.sensor.max_range_m), state.seen.features
-    for count in sorted(set(shots.tolist()) - {0}):
-        rows = (shots == count).nonzero().squeeze(1)
-        everything = len(rows) == len(shots)
-        drive = state.drive if everything else take(state.drive, rows)
-        measured = look(problem, drive, state.step[rows], Shots(count))
-        told = keep_untold(measured.seen, features[rows], Shots(count))
-        if everything:
-            return measured.score, told
-        score, features = put(score, rows, measured.score), put(features, rows, told)
+    features, counts = state.seen.features, sorted(set(shots.tolist()))
+    if len(counts) == 1 and counts[0]:
+        return _look_as(Shots(counts[0]), problem, state.drive, state.step, features, look)
+    score = no_depth(len(shots), problem.config.sensor.max_range_m)
+    for count in counts:
+        if count:
+            rows = (shots == count).nonzero().squeeze(1)
+            drive, before = take(state.drive, rows), features[rows]
+            part, told = _look_as(Shots(count), problem, drive, state.step[rows], before, look)
+            score, features = put(score, rows, part), put(features, rows, told)
     return score, features
+
+
+def _look_as(
+    shots: Shots, problem: Problem, drive: Drive, step: Tensor, features: Tensor, look: Look
+) -> tuple[DepthScore, Tensor]:
+    measured = look(problem, drive, step, shots)
+    return measured.score, keep_untold(measured.seen, features, shots)
 
 
 def keep_untold(new: Tensor, old: Tensor, shots: Shots) -> Tensor:
@@ -229,7 +236,7 @@ def observe(problem: Problem, state: State) -> Tensor:
     """Features float32 [B, len(FEATURES)] in [-LIMIT, LIMIT], in the order of `FEATURES`."""
     drive, seen, laser = state.drive, state.seen, problem.config.laser
     now, before = drive.frame(state.step), drive.frame((state.step - 1).clamp(min=0))
-    limit_k = torch.where(state.tripped, laser.release_k, laser.trip_k)
+    margin_k = torch.where(state.tripped, laser.release_k, laser.trip_k) - state.temperature_k
     columns = (
         gray_change(problem.scenes, before, now),
         seen.shots == Shots.TWO,
@@ -238,7 +245,7 @@ def observe(problem: Problem, state: State) -> Tensor:
         1.0 - torch.exp(seen.since_four / -16.0),
         1.0 - torch.exp(seen.since_eight / -16.0),
         (state.temperature_k - laser.release_k) / 20.0,
-        (limit_k - state.temperature_k) / 20.0,
+        margin_k.sign() * margin_k.abs().log1p() / 3.0,
         seen.duty,
         seen.power,
         1.0 - state.step * (2.0 / problem.config.frames_per_drive),

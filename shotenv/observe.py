@@ -47,7 +47,7 @@ STATE_FEATURES: Mapping[str, str] = {
     "since_four": "1 - exp(-n / 16), n frames since 4 or 8 shots",
     "since_eight": "1 - exp(-n / 16), n frames since 8 shots",
     "temperature": "laser temperature above its release temperature, over 20 K",
-    "heat_margin": "kelvin to the trip (or, negative, to the release while off) over 20 K",
+    "heat_margin": "log(1 + K to the trip; negative: to the release, while off) / 3, fine near 0",
     "duty": "laser duty over the last second, relative to always 8",
     "power": "power over the last second, relative to always 8",
     "time_left": "1 at the start of the drive, -1 at its end",
