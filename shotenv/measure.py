@@ -113,24 +113,27 @@ def measure(
 ) -> Measured:
     """Acquire, correct and score the frames at `step` [B] of `drive`."""
     made = acquire_depth(problem, drive, step, shots, noise)
+    valid = made.depth.valid.to(made.truth_m.dtype)
     score = score_depth(
         made.depth.distance_m,
-        made.depth.valid,
+        valid,
         made.truth_m,
         made.scored,
         error_scale_m=problem.config.reward.error_scale_m,
         unambiguous_m=unambiguous_range_m(problem.config.sensor.f1_hz),
         range_m=problem.config.sensor.max_range_m,
     )
-    return Measured(score, seen_by_sensor(made, shots))
+    return Measured(score, seen_by_sensor(made, valid, shots))
 
 
-def seen_by_sensor(made: Acquisition, shots: Shots) -> Tensor:
-    """What the sensor can tell of an acquisition without the truth, float32 [B, 6]."""
+def seen_by_sensor(made: Acquisition, valid: Tensor, shots: Shots) -> Tensor:
+    """What the sensor can tell of an acquisition without the truth, float32 [B, 6].
+
+    `valid` [B, H, W] is that of the depth, as 0 and 1.
+    """
     four_sigma = 4.0 * made.noise_lsb
     amplitude, residual = made.depth.amplitude, made.depth.residual
     pixels = amplitude.shape[1] * amplitude.shape[2]
-    valid = made.depth.valid.to(amplitude.dtype)
     maps = [amplitude, _bounded(amplitude, four_sigma), valid]
     maps.append(made.raw.saturated.to(amplitude.dtype))
     if residual is not None:

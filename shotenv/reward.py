@@ -70,14 +70,14 @@ def score_depth(
     `valid` and `scored` are bool, or float with 0 and 1 (float masks are several times faster).
     """
     counted = scored.to(distance_m.dtype)
-    good = valid.to(distance_m.dtype).mul_(counted)
+    good = valid.to(distance_m.dtype) * counted
     error_m = (distance_m - truth_m).abs_()
     error_m = error_m.nan_to_num_(FARTHEST_ERROR_M, FARTHEST_ERROR_M)
     good_error_m = error_m * good
     sums = frame_sums(
         counted,
         good,
-        error_m * counted / (error_m + error_scale_m),
+        (error_m * counted).div_(error_m + error_scale_m),
         good_error_m,
         error_m.mul(good_error_m),
         error_m.lt_(0.5 * unambiguous_m).mul_(good),

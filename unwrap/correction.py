@@ -110,7 +110,8 @@ def correct(
         raise ValueError(f"merge is {merge!r}; expected one of {', '.join(MERGES)}")
     first = decode(raw.dcs_lsb[:, :SAMPLES_PER_FREQUENCY], offset_lsb=offset_lsb)
     noise = sensor.noise_lsb if noise_lsb is None else noise_lsb
-    valid = (first.amplitude >= sensor.min_snr * noise) & ~raw.saturated
+    # Weights 0 and 1 in floats: comparing into a bool and converting it is several times slower.
+    valid = (first.amplitude - sensor.min_snr * noise).ge_(0).masked_fill_(raw.saturated, 0)
     if raw.shots == Shots.EIGHT:
         second = decode(raw.dcs_lsb[:, SAMPLES_PER_FREQUENCY:], offset_lsb=offset_lsb)
         merged_m, residual_m = unwrap_dual(
@@ -120,12 +121,12 @@ def correct(
             sensor.f2_hz,
             max_range_m=sensor.max_range_m,
         )
-        agree = residual_m <= sensor.max_residual_m
+        agree = residual_m.le_(sensor.max_residual_m)
         if prediction is not None:
             guess_m = _merged(first, prediction, sensor, merge)
-            merged_m = guess_m.lerp_(merged_m, agree.to(merged_m.dtype))
+            merged_m = guess_m.lerp_(merged_m, agree)
         else:
-            valid &= agree
+            valid.mul_(agree)
     elif prediction is None:
         raise ValueError(f"prediction is None; {int(raw.shots)} samples cannot be unwrapped alone")
     else:
@@ -152,13 +153,12 @@ def _frame(
     prediction: Prediction | None,
     sensor: SensorDescription,
 ) -> DepthFrame:
-    """Depth with the guess in place of what is invalid, and its whole wraps (0 where NaN)."""
+    """Depth with the guess where the weight `valid` is 0, and its whole wraps (0 where NaN)."""
     per_wrap = 1 / unambiguous_range_m(sensor.f1_hz)
     if prediction is None:
-        depth_m = merged_m.masked_fill_(~valid, torch.nan)
+        depth_m = merged_m.masked_fill_(valid == 0, torch.nan)
         wraps = depth_m.mul(per_wrap).nan_to_num_()
     else:
-        # By weights 0 and 1, which is exact and faster than torch.where.
-        depth_m = prediction.distance_m.lerp(merged_m, valid.to(merged_m.dtype))
+        depth_m = prediction.distance_m.lerp(merged_m, valid)
         wraps = depth_m.mul(per_wrap)
-    return DepthFrame(depth_m, wraps.long(), valid, first.amplitude, first.residual)
+    return DepthFrame(depth_m, wraps.long(), valid.bool(), first.amplitude, first.residual)
