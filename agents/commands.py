@@ -7,9 +7,9 @@ from typing import Any
 
 from jsonargparse import Namespace
 
-from agents.files import write_json
 from shotenv.config import BankConfig, DemoConfig
 from shotenv.progress import progress, say
+from unwrap.files import write_json
 
 DONE, FAILED = 0, 1
 

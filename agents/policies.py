@@ -144,7 +144,7 @@ class PpoPolicy(Policy):
         """Write `policy.safetensors`, then `agent.json`, each atomically."""
         from safetensors.torch import save
 
-        from agents.files import write_bytes, write_json
+        from unwrap.files import write_bytes, write_json
 
         folder.mkdir(parents=True, exist_ok=True)
         tensors = {name: value.contiguous() for name, value in self.network.state_dict().items()}

@@ -11,7 +11,6 @@ import numpy as np
 from plotly.offline import get_plotlyjs
 
 from agents import charts
-from agents.files import write_text
 from agents.pictures import CYCLIC, ERROR, GRAY, VIRIDIS, ColorMap, picture
 from agents.results import (
     FRAMES,
@@ -23,6 +22,7 @@ from agents.results import (
     read_strip,
     verdict,
 )
+from unwrap.files import write_text
 
 REPORT = "report.html"
 LARGEST_ERROR_M = 1.0

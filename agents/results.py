@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.files import write_bytes, write_json, write_text
+from unwrap.files import write_bytes, write_json, write_text
 
 RESULTS, DRIVES, TIMELINE, FRAMES = "results.json", "drives.csv", "timeline.json", "frames.npz"
 LABELS = {

@@ -17,7 +17,6 @@ from agents.evaluation import (
     summary,
     timeline,
 )
-from agents.files import write_json
 from agents.policies import (
     CyclePolicy,
     Policy,
@@ -37,6 +36,7 @@ from agents.results import (
 )
 from shotenv.config import DemoConfig, EnvConfig
 from shotenv.progress import progress, say
+from unwrap.files import write_json
 
 if TYPE_CHECKING:
     from shotenv.vector_env import ShotScheduleVectorEnv

@@ -24,11 +24,11 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.utils import set_random_seed
 from tqdm import tqdm
 
-from agents.files import write_bytes
 from agents.policies import PpoPolicy, first_line, network_arguments
 from agents.sb3_vector import Sb3VecEnv
 from shotenv.config import AgentConfig
 from shotenv.progress import progress
+from unwrap.files import write_bytes
 
 CHECKPOINT: Final = "checkpoint.safetensors"
 SCHEMA: Final = "1"

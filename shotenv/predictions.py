@@ -21,8 +21,9 @@ from torch import Tensor
 
 from shotenv.bank import Bank
 from shotenv.bank.build import cache_dir
-from shotenv.bank.store import sha256_of, write_json
+from shotenv.bank.store import sha256_of
 from shotenv.progress import progress
+from unwrap.files import write_json
 from unwrap.unwrapper import Prediction, Unwrapper
 
 ARRAYS = ("distance_m", "confidence")

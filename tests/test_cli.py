@@ -5,9 +5,9 @@ from report_sample import made_up_results, made_up_strip, made_up_timeline
 
 from agents.cli import COMMANDS, main
 from agents.doctor import Finding
-from agents.files import write_json
 from agents.results import FRAMES, RESULTS, TIMELINE, write_strip
 from shotenv.config import FAMILIES
+from unwrap.files import write_json
 
 
 def run(capsys, *words):

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from report_sample import made_up_results, made_up_strip, made_up_timeline
 
-from agents.files import write_bytes, write_json
 from agents.pictures import VIRIDIS, ColorMap, picture
 from agents.report import REPORT, render_page, write_report
 from agents.results import FRAMES, RESULTS, TIMELINE, read_strip, verdict, write_strip
 from shotenv.config import FAMILIES
+from unwrap.files import write_bytes, write_json
 
 
 def decoded(uri):

@@ -7,7 +7,6 @@ run that was not.
 
 from __future__ import annotations
 
-import json
 import logging
 import signal
 import warnings
@@ -27,12 +26,13 @@ from torch.nn import functional
 from torch.utils.data import DataLoader
 
 from unwrap.data import Augmentation, BankFrames, EpochShuffle
+from unwrap.files import write_json
 from unwrap.losses import EQUATION_7, regression_loss, wrap_loss
 from unwrap.merge import nearest_wraps
 from unwrap.nets import Autoencoder, TofRegNet, TofSegNet, autocast, class_depth_m
 from unwrap.phase import unambiguous_range_m
 from unwrap.unwrapper import load_unwrapper
-from unwrap.weights import save_weights, write_atomically
+from unwrap.weights import save_weights
 
 AUGMENTATION_STREAM = 1
 """Second word of the augmentation generator's seed, apart from the one that orders the frames."""
@@ -331,7 +331,7 @@ def _write(module: TrainingModule, bank: Path, out: Path) -> Path:
     }
     save_weights(path, network, metadata)
     numbers = {"config": config.model_dump(), "test": measure(module, bank)}
-    write_atomically(path.with_suffix(".json"), json.dumps(numbers, indent=2).encode() + b"\n")
+    write_json(path.with_suffix(".json"), numbers)
     return path
 
 

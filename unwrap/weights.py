@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +18,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor, nn
 
+from unwrap.files import write_bytes
 from unwrap.nets import NETWORKS, Autoencoder, TofRegNet, TofSegNet
 
 SCHEMA = "1"
@@ -54,7 +53,7 @@ def save_weights(path: Path, network: nn.Module, metadata: Mapping[str, Any]) ->
     words = {
         key: value if isinstance(value, str) else json.dumps(value) for key, value in values.items()
     }
-    write_atomically(path, save(tensors, words))
+    write_bytes(path, save(tensors, words))
 
 
 def _stored(tensor: Tensor) -> Tensor:
@@ -138,20 +137,3 @@ def build(metadata: Mapping[str, Any]) -> Autoencoder:
     if not (isinstance(classes, int) and 2 <= classes <= 16):
         raise ValueError(f"classes is {classes!r}; expected a whole number from 2 to 16")
     return TofSegNet(width, classes)
-
-
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write beside `path`, flush, rename: under the final name there is never half a file."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(
-        dir=path.parent, prefix=f".{path.name}.", delete=False
-    ) as file:
-        try:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-            os.fchmod(file.fileno(), 0o644)  # A temporary file is its owner's alone.
-            Path(file.name).replace(path)
-        except BaseException:
-            Path(file.name).unlink(missing_ok=True)
-            raise

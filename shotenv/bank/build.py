@@ -23,11 +23,11 @@ from shotenv.bank.store import (
     frame_bytes,
     read_clip_record,
     write_clip,
-    write_json,
     write_manifest,
 )
 from shotenv.config import BankConfig, Family
 from shotenv.progress import progress, say
+from unwrap.files import write_json
 
 RENDERING_VERSION = 1
 """Raised when the same configuration would give other light: old banks are then left alone."""

@@ -17,6 +17,7 @@ def write_bytes(path: Path, content: bytes) -> None:
     OSError
         No space or no permission; nothing was overwritten.
     """
+    path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
