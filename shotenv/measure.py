@@ -21,6 +21,7 @@ from shotenv.sensor import (
 from unwrap.acquisition import Shots
 from unwrap.correction import Prediction, correct
 from unwrap.frames import DepthFrame, RawFrame
+from unwrap.merge import weights_of
 from unwrap.phase import unambiguous_range_m
 
 
@@ -113,7 +114,7 @@ def measure(
 ) -> Measured:
     """Acquire, correct and score the frames at `step` [B] of `drive`."""
     made = acquire_depth(problem, drive, step, shots, noise)
-    valid = made.depth.valid.to(made.truth_m.dtype)
+    valid = weights_of(made.depth.valid)
     score = score_depth(
         made.depth.distance_m,
         valid,
@@ -134,8 +135,8 @@ def seen_by_sensor(made: Acquisition, valid: Tensor, shots: Shots) -> Tensor:
     four_sigma = 4.0 * made.noise_lsb
     amplitude, residual = made.depth.amplitude, made.depth.residual
     pixels = amplitude.shape[1] * amplitude.shape[2]
-    maps = [amplitude, _bounded(amplitude, four_sigma), valid]
-    maps.append(made.raw.saturated.to(amplitude.dtype))
+    saturated = weights_of(made.raw.saturated)
+    maps = [amplitude, _bounded(amplitude, four_sigma), valid, saturated]
     if residual is not None:
         maps.append(_bounded(residual, four_sigma))
     if shots == Shots.EIGHT:

@@ -16,7 +16,7 @@ from torch import Tensor
 from unwrap.acquisition import SAMPLES_PER_FREQUENCY, Shots
 from unwrap.dual import unwrap_dual
 from unwrap.frames import DepthFrame, PhaseFrame, RawFrame
-from unwrap.merge import merge_nearest, merge_regression
+from unwrap.merge import merge_nearest, merge_regression, weights_of
 from unwrap.phase import decode, distance_m, unambiguous_range_m
 
 Merge = Literal["nearest", "floor"]
@@ -111,7 +111,7 @@ def correct(
     first = decode(raw.dcs_lsb[:, :SAMPLES_PER_FREQUENCY], offset_lsb=offset_lsb)
     noise = sensor.noise_lsb if noise_lsb is None else noise_lsb
     # Weights 0 and 1 in floats: comparing into a bool and converting it is several times slower.
-    valid = (first.amplitude - sensor.min_snr * noise).ge_(0).masked_fill_(raw.saturated, 0)
+    valid = (first.amplitude - sensor.min_snr * noise).ge_(0).mul_(weights_of(~raw.saturated))
     if raw.shots == Shots.EIGHT:
         second = decode(raw.dcs_lsb[:, SAMPLES_PER_FREQUENCY:], offset_lsb=offset_lsb)
         merged_m, residual_m = unwrap_dual(

@@ -57,3 +57,12 @@ def above_zero(values: Tensor) -> Tensor:
     Choosing by `lerp` with these weights is exact and several times faster than `torch.where`.
     """
     return values.sign_().clamp_(min=0)
+
+
+def weights_of(mask: Tensor) -> Tensor:
+    """1 where the bool `mask` holds, else 0, float32; by way of bytes, which are converted faster.
+
+    >>> weights_of(torch.tensor([True, False]))
+    tensor([1., 0.])
+    """
+    return mask.view(torch.uint8).to(torch.float32)
