@@ -148,7 +148,7 @@ def step(
     look : callable
         `measure`, or something that gives the same faster (`shotenv.recall`).
     """
-    shots = SHOTS_OF_ACTION[actions].masked_fill(state.tripped, 0)
+    shots = SHOTS_OF_ACTION.take(actions).masked_fill(state.tripped, 0)
     score, features = _measure_by_shots(problem, state, shots, look)
     cost = cost_of(problem, state.drive, shots)
     terms = reward_terms(score, cost, state.drive.always_eight, state.tripped)

@@ -86,7 +86,7 @@ def acquire_depth(
     raw = acquire(electrons, sensor, shots=shots, noise=noise, offsets=drive.offsets)
     prediction_m = problem.kept.distance_of(frames)
     noise_lsb = sample_noise_lsb(
-        bank.gray(frames), problem.gray_exposure_s[frames], drive.integration_s, sensor
+        bank.gray(frames), problem.gray_exposure_s.take(frames), drive.integration_s, sensor
     )
     depth = correct(
         raw,

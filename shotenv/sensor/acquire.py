@@ -84,10 +84,9 @@ def collect(
     exposure: Exposure, sensor: SensorConfig, laser_power_w: Tensor, integration_s: Tensor
 ) -> Electrons:
     """Electrons that each pixel collects in one sample."""
-    rate = electrons_per_radiance_second(sensor)
-    seconds = integration_s[:, None, None]
-    per_radiance = (rate * seconds).to(exposure.ambient.dtype)
-    per_watt = (rate * seconds * laser_power_w[:, None, None]).to(exposure.ambient.dtype)
+    in_sample = electrons_per_radiance_second(sensor) * integration_s
+    per_radiance = in_sample.to(exposure.ambient.dtype).view(-1, 1, 1)
+    per_watt = (in_sample * laser_power_w).to(exposure.ambient.dtype).view(-1, 1, 1)
     return Electrons(
         exposure.active * per_watt, exposure.ambient * per_radiance, exposure.correlation, per_watt
     )
