@@ -72,7 +72,7 @@ def train_scheduler(config: DemoConfig, out: Path) -> PpoPolicy:
 
     The policy with the best return on validation drives is kept.
     """
-    from agents.sb3_vector import Sb3VecEnv
+    from agents.paired import PairedVecEnv
     from agents.training import Trainer
 
     envs = make_envs(config.env, "train", config.agent.num_envs, "SameStep")
@@ -83,7 +83,7 @@ def train_scheduler(config: DemoConfig, out: Path) -> PpoPolicy:
         return float(play_drives(policy, judges, seeds).reward.sum(axis=1).mean())
 
     names, frames = envs.feature_names, config.env.frames_per_drive
-    return Trainer(Sb3VecEnv(envs), names, frames, config.agent, validate, out).run()
+    return Trainer(PairedVecEnv(envs), names, frames, config.agent, validate, out).run()
 
 
 def tune_rule(config: DemoConfig) -> SnrThresholdPolicy:

@@ -30,6 +30,7 @@ from shotenv.observe import FEATURES
 from shotenv.problem import open_problem
 from shotenv.recall import Recall
 from shotenv.resolve import env_config
+from unwrap.acquisition import Shots
 
 
 class ShotScheduleVectorEnv(VectorEnv):
@@ -127,6 +128,14 @@ class ShotScheduleVectorEnv(VectorEnv):
             told[row] = told.get(row, {}) | info
         none = np.zeros(self.num_envs, dtype=bool)
         return self._observations(), rewards, none, truncated, self._batched(told)
+
+    def error_of(self, shots: Shots) -> np.ndarray:
+        """Error term [N] that `shots` would bring in the current frames; nothing is played.
+
+        It does not depend on what is played, so it can serve as a control variate in training.
+        """
+        state = self._under_way()
+        return self._look(self.problem, state.drive, state.step, shots).score.error.numpy()
 
     def _play(
         self, rows: np.ndarray, actions: torch.Tensor

@@ -1,0 +1,39 @@
+"""Rewards for training in which the frame's own difficulty cancels."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from agents.sb3_vector import Sb3VecEnv
+from shotenv.vector_env import ShotScheduleVectorEnv
+from unwrap.acquisition import Shots
+
+LOWEST: Final = -0.25
+"""Floor of a training reward. A frame without laser costs some ten times what choices differ by;
+at a few times that a trip deters as surely and does not drown the rest of its batch."""
+
+
+class PairedVecEnv(Sb3VecEnv):
+    """Adapter whose rewards are relative to what 4 DCS would have brought in the same frame.
+
+    How hard a frame is varies far more than what the choice of shots changes. The error of 4 DCS
+    in the same frame with the same noise is known, and no action changes it: adding it to the
+    reward leaves the best policy as it is (a control variate) and takes most of the noise away.
+
+    Parameters
+    ----------
+    envs : ShotScheduleVectorEnv
+        Made with `autoreset_mode="SameStep"`, best with `remember=True`.
+    """
+
+    def __init__(self, envs: ShotScheduleVectorEnv) -> None:
+        super().__init__(envs)
+        self._native = envs
+
+    def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """Step all environments with the kept actions."""
+        usual = self._native.problem.config.reward.error * self._native.error_of(Shots.FOUR)
+        observations, rewards, dones, infos = super().step_wait()
+        return observations, np.maximum(rewards + usual, LOWEST).astype(np.float32), dones, infos
