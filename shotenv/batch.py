@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
-from typing import TypeVar
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
 import torch
 from torch import Tensor
@@ -14,26 +14,25 @@ Batched = TypeVar("Batched")
 
 def take(value: Batched, rows: Tensor) -> Batched:
     """The rows `rows` (int64 [b]) of every tensor in `value`."""
-    if isinstance(value, Tensor):
-        return value.index_select(0, rows)
-    return _rebuilt(value, lambda name: take(getattr(value, name), rows))
+    return _mapped(lambda tensor: tensor.index_select(0, rows), value)
 
 
 def put(value: Batched, rows: Tensor, new: Batched) -> Batched:
     """A copy of `value` in which the rows `rows` (int64 [b]) are those of `new`."""
-    if isinstance(value, Tensor):
-        return value.index_copy(0, rows, new)
-    return _rebuilt(value, lambda name: put(getattr(value, name), rows, getattr(new, name)))
+    return _mapped(lambda tensor, other: tensor.index_copy(0, rows, other), value, new)
 
 
 def concatenate(values: Sequence[Batched]) -> Batched:
     """One batch of all rows of `values`, in order."""
-    if len(values) == 1:
-        return values[0]
-    if isinstance(values[0], Tensor):
-        return torch.cat(list(values))
-    return _rebuilt(values[0], lambda name: concatenate([getattr(v, name) for v in values]))
+    return values[0] if len(values) == 1 else _mapped(lambda *parts: torch.cat(parts), *values)
 
 
-def _rebuilt(value: Batched, of) -> Batched:
-    return type(value)(**{field.name: of(field.name) for field in dataclasses.fields(value)})
+def _mapped(function: Callable[..., Tensor], *values: Any) -> Any:
+    """`function` of the corresponding tensors of `values`, which are of one type."""
+    first = values[0]
+    if isinstance(first, Tensor):
+        return function(*values)
+    fields = [field.name for field in dataclasses.fields(first)]
+    return type(first)(
+        **{name: _mapped(function, *(getattr(value, name) for value in values)) for name in fields}
+    )

@@ -17,7 +17,7 @@ import shutil
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -25,7 +25,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from shotenv.config import BankConfig, one_sentence
 from unwrap.files import write_json
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION: Final = 1
 MANIFEST = "manifest.json"
 LARGEST_JSON_BYTES = 64 * 2**20
 Split = Literal["train", "validation", "test"]
@@ -112,7 +112,7 @@ def frame_bytes(height: int, width: int) -> int:
 
 
 def write_clip(
-    folder: Path, arrays: Mapping[str, np.ndarray], metadata: Mapping[str, object]
+    folder: Path, arrays: Mapping[str, np.ndarray], metadata: Mapping[str, Any]
 ) -> ClipRecord:
     """Write a clip's arrays and its record under `folder`, atomically.
 
