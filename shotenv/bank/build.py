@@ -32,7 +32,7 @@ from unwrap.files import write_json
 RENDERING_VERSION = 1
 """Raised when the same configuration would give other light: old banks are then left alone."""
 
-SECONDS_PER_MILLION_RAYS = 0.3
+SECONDS_PER_MILLION_RAYS = 0.5
 """Camera rays with two bounces, one core, measured; only used to announce a duration."""
 
 ACQUISITION_FIELDS = {
