@@ -48,6 +48,10 @@ class SensorConfig(Section):
     integration_s: Range = Field(
         (5.5e-4, 7.5e-4), description="integration time drawn per drive, s"
     )
+    harmonic_strength: Fraction = Field(
+        0.0, description="overtones of light and demodulation: 0 = sines, 1 = ideal squares"
+    )
+    highest_harmonic: int = Field(7, ge=1, le=31, description="highest odd harmonic rendered")
     wavelength_nm: Positive = Field(940.0, description="laser wavelength, nm")
     f_number: Positive = Field(1.2, description="lens f-number")
     lens_transmission: Fraction = Field(0.8, description="lens and filter transmission")
@@ -80,6 +84,8 @@ class SensorConfig(Section):
         check_range("integration_s", self.integration_s)
         if self.f2_hz >= self.f1_hz:
             raise ValueError(f"f2_hz is {self.f2_hz:g}; expected less than f1_hz = {self.f1_hz:g}")
+        if self.highest_harmonic % 2 == 0:
+            raise ValueError(f"highest_harmonic is {self.highest_harmonic}; expected an odd number")
         if self.integration_s[0] <= 0 or self.integration_s[1] >= self.sample_period_s:
             raise ValueError(
                 f"integration_s is {self.integration_s}; expected 0 < t < sample_period_s = "

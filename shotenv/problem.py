@@ -83,7 +83,14 @@ def open_problem(config: EnvConfig) -> Problem:
     )
 
 
-RENDERED_WITH = ("f1_hz", "f2_hz", "sample_period_s", "wavelength_nm")
+RENDERED_WITH = (
+    "f1_hz",
+    "f2_hz",
+    "sample_period_s",
+    "harmonic_strength",
+    "highest_harmonic",
+    "wavelength_nm",
+)
 """Sensor fields that are part of the rendered light and cannot be changed afterwards."""
 
 

@@ -46,3 +46,36 @@ def sample_times_s(shots: int, sample_period_s: float) -> tuple[float, ...]:
     `sample_period_s` is integration time plus readout time.
     """
     return tuple(k * sample_period_s for k in range(int(shots)))
+
+
+def harmonic_weights(strength: float, highest: int) -> tuple[tuple[int, float], ...]:
+    """Odd harmonics of the correlation and their weights relative to the fundamental.
+
+    Square light times square demodulation correlates to a triangle, sum of cos(h phi) / h^2 over
+    odd h; `strength` scales what lies beyond the fundamental.
+
+    Parameters
+    ----------
+    strength : float
+        0 = pure sine, 1 = ideal squares.
+    highest : int
+        Highest harmonic kept, odd.
+
+    Raises
+    ------
+    ValueError
+        A strength outside 0..1, or a highest harmonic that is even or less than 1.
+
+    Examples
+    --------
+    >>> harmonic_weights(0.0, 7)
+    ((1, 1.0),)
+    >>> harmonic_weights(1.0, 3)
+    ((1, 1.0), (3, 0.1111111111111111))
+    """
+    if not 0.0 <= strength <= 1.0:
+        raise ValueError(f"strength is {strength}; expected 0 to 1")
+    if highest < 1 or highest % 2 == 0:
+        raise ValueError(f"highest is {highest}; expected an odd number of at least 1")
+    overtones = range(3, highest + 1, 2) if strength > 0 else ()
+    return ((1, 1.0), *((h, strength / h**2) for h in overtones))
