@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 
 import numpy as np
 
@@ -33,22 +34,19 @@ def floor(half_m: float = 100.0) -> np.ndarray:
     return square((0, 0, 0), (half_m, 0, 0), (0, half_m, 0))
 
 
-def mesh(corners: np.ndarray, albedo: float = ALBEDO, retro=0.0, emission=0.0) -> Mesh:
+def mesh(
+    corners: np.ndarray, albedo=ALBEDO, retro=0.0, emission=0.0, mirror=0.0, clear=0.0
+) -> Mesh:
     """A mesh of one plain material."""
-    faces = len(corners)
-    return Mesh(
-        corners=np.asarray(corners, np.float32),
-        uv=np.zeros((faces, 3, 2), np.float32),
-        albedo_low=np.full(faces, albedo, np.float32),
-        albedo_high=np.full(faces, albedo, np.float32),
-        retro=np.full(faces, retro, np.float32),
-        emission=np.full(faces, emission, np.float32),
-    )
+    numbers = (albedo, albedo, retro, emission, mirror, clear)
+    uv = np.zeros((len(corners), 3, 2), np.float32)
+    per_face = [np.full(len(corners), number, np.float32) for number in numbers]
+    return Mesh(np.asarray(corners, np.float32), uv, *per_face)
 
 
 def joined(*meshes: Mesh) -> Mesh:
     """Several meshes as one."""
-    names = ("corners", "uv", "albedo_low", "albedo_high", "retro", "emission")
+    names = [field.name for field in fields(Mesh)]
     return Mesh(*(np.concatenate([getattr(part, name) for part in meshes]) for name in names))
 
 

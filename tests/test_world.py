@@ -348,3 +348,16 @@ def test_texture_has_one_scale_on_every_side_of_a_box():
 def test_bad_arguments_are_named(family, seed, config, named):
     with pytest.raises(ValueError, match=named):
         draw_world(family, seed, config)
+
+
+@pytest.mark.parametrize(("mirror", "clear"), [(-0.1, 0.0), (0.0, -0.1), (0.6, 0.5)])
+def test_shares_that_are_mirrored_and_pass_are_checked(mirror, clear):
+    message = f"mirror is {mirror:g} and clear is {clear:g}; expected shares"
+    with pytest.raises(ValueError, match=message):
+        m.Material(0.2, 0.3, mirror=mirror, clear=clear)
+
+
+def test_shares_reach_every_face():
+    pane = meshes.box((1.0, 1.0, 1.0), m.Material(0.2, 0.3, mirror=0.25, clear=0.5))
+    assert (pane.mirror == np.float32(0.25)).all() and (pane.clear == np.float32(0.5)).all()
+    assert len(pane.mirror) == len(pane.clear) == len(pane.corners)

@@ -36,7 +36,8 @@ class Geometry:
     surface : float32 [S + M, 4]
         Albedo where the noise texture is 0 and where it is 1, retro-reflection, emission.
     uv : float32 [S + M, 8]
-        Texture coordinates of the first corner, then the edges to the other two, then zeros.
+        Texture coordinates of the first corner, then the edges to the other two, then the
+        mirrored and the clear share.
     """
 
     static: np.ndarray
@@ -101,7 +102,7 @@ def _padding(world: World) -> list[Mesh]:
     zero = np.zeros(1, np.float32)
     buried = np.asarray(world.ego.start.position_m) - (0.0, 0.0, 10.0)
     corners = np.broadcast_to(buried.astype(np.float32), (1, 3, 3))
-    return [Mesh(corners, np.zeros((1, 3, 2), np.float32), zero, zero, zero, zero)]
+    return [Mesh(corners, np.zeros((1, 3, 2), np.float32), *[zero] * 6)]
 
 
 def _normals(corners: np.ndarray) -> np.ndarray:
@@ -118,5 +119,5 @@ def _surface(mesh: Mesh) -> np.ndarray:
 
 def _edges_uv(mesh: Mesh) -> np.ndarray:
     first, second, third = np.moveaxis(mesh.uv.astype(np.float32), 1, 0)
-    packed = np.concatenate([first, second - first, third - first], axis=1)
-    return np.pad(packed, ((0, 0), (0, 2)))
+    shares = np.stack([mesh.mirror, mesh.clear], axis=1).astype(np.float32)
+    return np.concatenate([first, second - first, third - first, shares], axis=1)

@@ -31,6 +31,14 @@ class Material:
         Retro-reflection, times the Lambertian return.
     emission : float
         Radiance of the face itself, W m-2 sr-1.
+    mirror, clear : float
+        Shares of the light that are mirrored and that pass straight through, together at most 1;
+        the rest meets the diffuse surface. Emission is not divided.
+
+    Raises
+    ------
+    ValueError
+        A share is negative, or both together exceed 1.
     """
 
     albedo_low: float
@@ -39,6 +47,15 @@ class Material:
     offset: float = 0.0
     retro: float = 0.0
     emission: float = 0.0
+    mirror: float = 0.0
+    clear: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.mirror < 0 or self.clear < 0 or self.mirror + self.clear > 1:
+            raise ValueError(
+                f"mirror is {self.mirror:g} and clear is {self.clear:g}; expected shares of at "
+                "least 0 that add up to at most 1"
+            )
 
     def glowing(self, radiance: float) -> Material:
         """The same surface, lit from within with `radiance` in W m-2 sr-1."""

@@ -37,6 +37,8 @@ def soup(corners: np.ndarray, material: Material) -> Mesh:
         albedo_high=per_face(material.albedo_high),
         retro=per_face(material.retro),
         emission=per_face(material.emission),
+        mirror=per_face(material.mirror),
+        clear=per_face(material.clear),
     )
 
 

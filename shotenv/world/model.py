@@ -30,6 +30,11 @@ class Mesh:
     emission : float32 [F]
         Radiance that the camera sees on the face itself, W m-2 sr-1 (lamps; their light on
         other things comes from `Lamp`).
+    mirror : float32 [F]
+        Share of the light that is mirrored: wet ground, glass, glossy paint; 0 for most.
+    clear : float32 [F]
+        Share of the light that passes straight through, as through a thin pane; 0 for most.
+        The rest, 1 - mirror - clear, meets the diffuse surface below.
     """
 
     corners: np.ndarray
@@ -38,6 +43,8 @@ class Mesh:
     albedo_high: np.ndarray
     retro: np.ndarray
     emission: np.ndarray
+    mirror: np.ndarray
+    clear: np.ndarray
 
 
 @dataclass(frozen=True)
