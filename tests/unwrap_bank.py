@@ -10,11 +10,14 @@ import numpy as np
 HEIGHT, WIDTH, FRAMES = 48, 64, 2
 
 
-def write_bank(root: Path, train: int = 4, validation: int = 1, test: int = 1) -> Path:
+def write_bank(
+    root: Path, train: int = 4, validation: int = 1, test: int = 1, shift: int = 0
+) -> Path:
     """Write gray images that darken with distance, and their distances; the sky is infinite."""
     random = np.random.default_rng(0)
     clips = []
-    for split, count in (("train", train), ("validation", validation), ("test", test)):
+    counts = {"train": train, "validation": validation, "test": test, "shift": shift}
+    for split, count in counts.items():
         for index in range(count):
             folder = f"clips/{split}-{index}"
             write_clip(root / folder, random)

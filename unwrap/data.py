@@ -17,13 +17,16 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import torch
 from torch import Tensor
 from torch.utils.data import Dataset, Sampler
 
+from unwrap.splits import RANDOM_SPLITS, random_split
+
+SplitBy = Literal["clip", "frame"]
 GRAY_FULL_SCALE = 4095
 """Largest word of the 12-bit gray image."""
 
@@ -71,7 +74,7 @@ def _flip(images: Tensor, chosen: Tensor, axis: int) -> Tensor:
 
 
 class BankFrames(Dataset):
-    """Every frame of the clips of one split of a bank: (gray, depth_m).
+    """Every frame of one split of a bank: (gray, depth_m).
 
     Gray is float32 [1, H, W] in [0, 1]; depth float32 [H, W] in metres, no farther than `range_m`
     (also the sky).
@@ -81,9 +84,12 @@ class BankFrames(Dataset):
     bank : Path
         Folder of the bank.
     split : str
-        "train", "validation" or "test".
+        "train", "validation", "test" or "shift".
     range_m : float
         Distance at which truth is clamped, metres.
+    by : "clip" or "frame"
+        Whole clips, as the manifest assigns them; or the paper's `random_split` of all frames
+        but those of the shift split.
 
     Raises
     ------
@@ -92,20 +98,23 @@ class BankFrames(Dataset):
         message names the file.
     """
 
-    def __init__(self, bank: Path, split: str, range_m: float):
+    def __init__(self, bank: Path, split: str, range_m: float, *, by: SplitBy = "clip"):
         self.range_m = range_m
-        clips = [clip for clip in read_clips(bank) if clip["split"] == split]
-        if not clips:
+        splits = (split,) if by == "clip" else RANDOM_SPLITS
+        clips = [clip for clip in read_clips(bank) if clip["split"] in splits]
+        if not clips or (by == "frame" and split not in RANDOM_SPLITS):
             raise ValueError(
-                f"{bank}: no clip of split {split!r}; render more clips or pick another bank"
+                f"{bank}: no {by} of split {split!r}; render more clips or pick another bank"
             )
-        self.families: list[str] = []
-        self._frames: list[tuple[Path, int]] = []
-        for clip in clips:
-            folder = bank / clip["folder"]
-            count = len(open_array(folder / "gray.npy", np.uint16))
-            self._frames += [(folder, frame) for frame in range(count)]
-            self.families += [clip["family"]] * count
+        frames = [
+            (bank / clip["folder"], frame, clip["family"])
+            for clip in clips
+            for frame in range(len(open_array(bank / clip["folder"] / "gray.npy", np.uint16)))
+        ]
+        if by == "frame":
+            frames = [frames[number] for number in random_split(len(frames))[split]]
+        self._frames = [(folder, frame) for folder, frame, _ in frames]
+        self.families = [family for *_, family in frames]
 
     def __len__(self) -> int:
         """Number of frames."""

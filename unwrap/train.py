@@ -25,7 +25,7 @@ from torch import Tensor
 from torch.nn import functional
 from torch.utils.data import DataLoader
 
-from unwrap.data import Augmentation, BankFrames, EpochShuffle
+from unwrap.data import Augmentation, BankFrames, EpochShuffle, SplitBy
 from unwrap.files import write_json
 from unwrap.losses import EQUATION_7, regression_loss, wrap_loss
 from unwrap.merge import nearest_wraps
@@ -53,6 +53,9 @@ class TrainConfig(BaseModel):
 
     network: Literal["tofregnet", "tofsegnet"] = Field("tofregnet", description="which network")
     bank: str = Field("training", description="name or path of the bank to train on")
+    split_by: SplitBy = Field(
+        "clip", description="whole clips, or the paper's random split of frames"
+    )
     width: int = Field(32, ge=4, le=128, description="channels of the first ResNet stage")
     classes: int = Field(5, ge=2, le=16, description="wrap classes of tofsegnet")
     f1_hz: float = Field(24e6, gt=0, description="frequency whose wraps are predicted, Hz")
@@ -257,7 +260,8 @@ def train(
     KeyboardInterrupt
         Ctrl-C; the checkpoint is kept.
     """
-    frames = BankFrames(bank, "train", config.clamp_m)
+    frames = BankFrames(bank, "train", config.clamp_m, by=config.split_by)
+    validation = BankFrames(bank, "validation", config.clamp_m, by=config.split_by)
     steps = config.epochs * -(-len(frames) // config.batch_size)
     module = TrainingModule(config, steps)
     checkpoint = out / f"{config.network}.ckpt"
@@ -266,7 +270,7 @@ def train(
         trainer.fit(
             module,
             DataLoader(frames, config.batch_size, sampler=EpochShuffle(len(frames), config.seed)),
-            DataLoader(BankFrames(bank, "validation", config.clamp_m), config.batch_size),
+            DataLoader(validation, config.batch_size),
             ckpt_path=str(checkpoint) if resume and checkpoint.is_file() else None,
             weights_only=True,
         )
@@ -343,7 +347,7 @@ def measure(module: TrainingModule, bank: Path, split: str = "test") -> dict[str
     `mae_m` the prediction's own error; all over pixels within the scored range.
     """
     config = module.config
-    frames = BankFrames(bank, split, config.clamp_m)
+    frames = BankFrames(bank, split, config.clamp_m, by=config.split_by)
     module = module.eval().to("cpu")
     sums: dict[str, Tensor] = {}
     for family, (gray, depth_m) in zip(frames.families, DataLoader(frames), strict=True):
