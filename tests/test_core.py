@@ -60,10 +60,15 @@ def test_a_frame_without_scored_pixels_costs_nobody_anything():
     assert found.error.item() == 0.0 and found.valid_share.item() == 1.0
 
 
+def cost_where(one, **values):
+    fields = [field.name for field in dataclasses.fields(ShotCost)]
+    return ShotCost(**{name: values.get(name, 0.0) * one for name in fields})
+
+
 def test_reward_is_minus_the_weighted_terms():
     one = torch.ones(1, dtype=torch.float64)
-    cost = ShotCost(1 * one, 2 * one, 0.02 * one, 1 * one)
-    eight = ShotCost(4 * one, 5 * one, 0.08 * one, 4 * one)
+    cost = cost_where(one, energy_j=2.0, duty=0.02)
+    eight = cost_where(one, energy_j=5.0, duty=0.08)
     terms = reward_terms(no_depth(1, 25.0), cost, eight, torch.tensor([True]))
     assert {name: value.item() for name, value in terms.items()} == {
         "error": 1.0,
@@ -87,14 +92,15 @@ def test_sums_are_the_same_on_any_number_of_threads():
 
 
 def test_rows_of_nested_values():
-    state = ShotCost(*(torch.arange(4.0) + 10 * i for i in range(4)))
+    count = len(dataclasses.fields(ShotCost))
+    state = ShotCost(*(torch.arange(4.0) + 10 * i for i in range(count)))
     rows = torch.tensor([3, 1])
     part = take(state, rows)
-    assert part.duty.tolist() == [23.0, 21.0]
-    changed = put(state, rows, ShotCost(*(torch.zeros(2) for _ in range(4))))
-    assert changed.heat_j.tolist() == [30.0, 0.0, 32.0, 0.0]
-    assert state.heat_j.tolist() == [30.0, 31.0, 32.0, 33.0]
-    assert concatenate([part, part]).energy_j.tolist() == [13.0, 11.0] * 2
+    assert part.readout_energy_j.tolist() == [23.0, 21.0]
+    changed = put(state, rows, ShotCost(*(torch.zeros(2) for _ in range(count))))
+    assert changed.static_energy_j.tolist() == [30.0, 0.0, 32.0, 0.0]
+    assert state.static_energy_j.tolist() == [30.0, 31.0, 32.0, 33.0]
+    assert concatenate([part, part]).driver_energy_j.tolist() == [13.0, 11.0] * 2
 
 
 def test_a_drive_plays_whole_clips_of_its_split(problem):

@@ -1,0 +1,91 @@
+"""What a frame costs: optical power, efficiency, and where the energy goes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from shotenv.config import ROOM_K, LaserConfig
+from shotenv.frames import ShotCost
+from shotenv.laser.ageing import ageing_rate
+
+Array = Any
+SECONDS_PER_HOUR = 3600.0
+NETWORK_RUNS = torch.tensor([0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0], dtype=torch.float64)
+"""Predictions by number of samples: two and four do not unwrap by themselves."""
+
+
+def emitted_power_w(power_w: Array, temperature_k: Array, laser: LaserConfig) -> Array:
+    """Optical power while on, W, after derating.
+
+    Above `derate_k` it falls by `derate_per_k` of the undiminished `power_w` per kelvin, down to
+    `derate_floor` of it.
+    """
+    if not laser.derate_per_k:
+        return power_w
+    above_k = temperature_k - laser.derate_k
+    return power_w * (1.0 - laser.derate_per_k * above_k).clip(laser.derate_floor, 1.0)
+
+
+def efficiency_at(temperature_k: Array, laser: LaserConfig) -> Array:
+    """Optical over electrical power; falls linearly from 25 C to the trip temperature.
+
+    A VCSEL loses about 0.001 to 0.003 per kelvin (assumed). No light is made above the trip.
+    """
+    if not laser.efficiency_slope_per_k:
+        return laser.efficiency
+    above_k = (temperature_k - ROOM_K).clip(0.0, max(laser.trip_k - ROOM_K, 0.0))
+    return laser.efficiency - laser.efficiency_slope_per_k * above_k
+
+
+def shot_cost(
+    shots: Tensor,
+    laser: LaserConfig,
+    *,
+    optical_power_w: Tensor,
+    temperature_k: Tensor | float = ROOM_K,
+    integration_s: Tensor,
+    frame_period_s: float,
+    network_macs: float,
+) -> ShotCost:
+    """Energy, duty, heat and wear of one frame.
+
+    Laser, modulation driver and readouts go with the samples, one readout more with the gray
+    image; the imager's static power with the frame period; the network is run where the shots do
+    not unwrap by themselves, with 2 and 4 samples.
+
+    Parameters
+    ----------
+    shots : int64 [B]
+        0 (laser off), 2, 4 or 8.
+    optical_power_w, integration_s : float64 [B]
+        Emitted power while on, W; time of one sample, s.
+    temperature_k : float64 [B]
+        Of the junction, at the start of the frame.
+    frame_period_s : float
+        Seconds from frame to frame.
+    network_macs : float
+        Multiply-accumulates of one prediction.
+    """
+    on_s = shots * integration_s
+    optical_j = on_s * optical_power_w
+    efficiency = efficiency_at(temperature_k, laser)
+    laser_j, driver_j = optical_j / efficiency, on_s * laser.driver_power_w
+    readout_j = (shots + 1) * laser.readout_energy_j
+    static_j = torch.full_like(on_s, laser.static_power_w * frame_period_s)
+    network_j = NETWORK_RUNS.take(shots) * (network_macs * laser.energy_per_mac_j)
+    wear = ageing_rate(optical_power_w / efficiency, temperature_k, laser)
+    return ShotCost(
+        laser_energy_j=laser_j,
+        driver_energy_j=driver_j,
+        readout_energy_j=readout_j,
+        static_energy_j=static_j,
+        network_energy_j=network_j,
+        energy_j=laser_j + driver_j + readout_j + static_j + network_j,
+        optical_j=optical_j,
+        heat_j=laser_j - optical_j,
+        duty=on_s / frame_period_s,
+        life_used_h=on_s * (wear / SECONDS_PER_HOUR),
+    )
