@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import torch
 from torch import Tensor
@@ -100,44 +102,54 @@ def acquire(
     noise: Tensor | None,
     offsets: OffsetPattern | None,
 ) -> RawFrame:
-    """Noise, full well and converter for charge that is known to be sound; see `expose`."""
+    """Noise, full well and converter for charge that is known to be sound; see `expose`.
+
+    Sample after sample, so that what one sample needs stays in the processor's cache.
+    """
     mean_e = (electrons.active_e + electrons.ambient_e).mul_(0.5)
-    half_scale = (electrons.per_correlation_e * (0.5 * sensor.contrast)).unsqueeze(1)
-    taps_e = tap_electrons(mean_e.unsqueeze(1), electrons.correlation[:, :shots] * half_scale)
-    if noise is not None:
-        taps_e = add_noise(taps_e, noise[:, :shots], sensor.read_noise_e)
-    held_e = clip_to_full_well(taps_e, sensor.full_well_e)
+    half_modulation = mean_e.new_tensor([0.5, -0.5]).view(2, 1, 1).mul_(sensor.contrast)
+    per_correlation_e = electrons.per_correlation_e.unsqueeze(1) * half_modulation
     pattern_lsb = fixed_pattern_lsb(electrons.ambient_e, sensor, offsets)
-    dcs_lsb = read_out(held_e, pattern_lsb, sensor)
-    return RawFrame(dcs_lsb, _saturated(held_e, dcs_lsb, sensor))
+    batch, _, height, width = electrons.correlation.shape
+    dcs_lsb = mean_e.new_empty(batch, int(shots), height, width)
+    fullest_e = []
+    for sample, sample_lsb in enumerate(dcs_lsb.unbind(1)):
+        taps_e = tap_electrons(mean_e, electrons.correlation[:, sample], per_correlation_e)
+        if noise is not None:
+            add_noise(taps_e, noise[:, sample], sensor.read_noise_e)
+        held_e = clip_to_full_well(taps_e, sensor.full_well_e)
+        read_out(held_e, pattern_lsb, sensor, out=sample_lsb)
+        fullest_e.append(torch.maximum(held_e[:, 0], held_e[:, 1]))
+    return RawFrame(dcs_lsb, _saturated(fullest_e, dcs_lsb, sensor))
 
 
-def read_out(held_e: Tensor, pattern_lsb: Tensor, sensor: SensorConfig) -> Tensor:
-    """Signed words [B, n, H, W] of the charge that the taps hold, [B, n, 2, H, W] electrons.
+def read_out(held_e: Tensor, pattern_lsb: Tensor, sensor: SensorConfig, *, out: Tensor) -> None:
+    """Signed words [B, H, W] of the charge that the taps hold, [B, 2, H, W] electrons.
 
     The taps' difference, then gain, offset, rounding and the converter's range.
     """
-    analogue_lsb = (held_e[:, :, 0] - held_e[:, :, 1]).mul_(sensor.gain_lsb_per_e)
-    analogue_lsb.add_(pattern_lsb)
-    return digitise(analogue_lsb, *signed_limits_lsb(sensor.adc_bits))
+    difference_e = held_e[:, 0] - held_e[:, 1]
+    torch.add(pattern_lsb, difference_e, alpha=sensor.gain_lsb_per_e, out=out)
+    digitise(out, *signed_limits_lsb(sensor.adc_bits))
 
 
-def _saturated(held_e: Tensor, dcs_lsb: Tensor, sensor: SensorConfig) -> Tensor:
-    """Where the fullest tap was full, or a word is at a limit of the converter's range."""
+def _saturated(fullest_e: Sequence[Tensor], dcs_lsb: Tensor, sensor: SensorConfig) -> Tensor:
+    """Where the fuller tap of some sample was full, or its word is at a limit of the range."""
     low, high = signed_limits_lsb(sensor.adc_bits)
-    beyond = held_e.amax(dim=(1, 2)).sub_(sensor.full_well_e)
-    torch.maximum(beyond, dcs_lsb.amax(dim=1).sub_(high), out=beyond)
-    torch.maximum(beyond, dcs_lsb.amin(dim=1).neg_().add_(low), out=beyond)
-    return beyond.ge_(0.0).bool()
+    words = dcs_lsb.unbind(1)
+    # In place a comparison stays float32, which is vectorised; a bool result is not.
+    beyond = reduce(torch.maximum, fullest_e).ge_(sensor.full_well_e)
+    beyond.add_(reduce(torch.maximum, words).ge_(high))
+    return beyond.add_(reduce(torch.minimum, words).le_(low)).bool()
 
 
 def fixed_pattern_lsb(
     ambient_e: Tensor, sensor: SensorConfig, offsets: OffsetPattern | None
 ) -> Tensor:
-    """Offset [B, 1, H, W] of every sample: the taps' pattern and what ambient adds; or 0."""
+    """Offset [B, H, W] of every sample: the taps' pattern and what ambient adds; or 0."""
     if offsets is None:
         return ambient_e.new_zeros(())
-    return ambient_offset_lsb(ambient_e, sensor).add_(offsets.pattern_lsb).unsqueeze(1)
+    return ambient_offset_lsb(ambient_e, sensor).add_(offsets.pattern_lsb)
 
 
 def single_sample_snr(electrons: Electrons, sensor: SensorConfig) -> Tensor:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from torch import Tensor
 
+from unwrap.words import mid_scale
+
 
 def signed_limits_lsb(bits: int) -> tuple[float, float]:
-    """Lowest and highest sample of a converter whose words 1..2^bits - 2 are not overflow.
-
-    The signed sample is the word minus mid-scale `2^(bits - 1)`; word 0 and the last one report
-    overflow (epc660: below 1 or above 4094).
-    """
-    middle = 2 ** (bits - 1)
-    return 1.0 - middle, middle - 2.0
+    """Samples of the lowest and the highest word, which report overflow; see `unwrap.words`."""
+    middle = mid_scale(bits)
+    return 0.0 - middle, full_scale_lsb(bits) - middle
 
 
 def full_scale_lsb(bits: int) -> int:

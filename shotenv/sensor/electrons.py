@@ -33,36 +33,35 @@ def electrons_per_radiance_second(sensor: SensorConfig) -> float:
     return irradiance * area_m2 * per_photon
 
 
-def tap_electrons(mean_e: Tensor, half_modulated_e: Tensor) -> Tensor:
+def tap_electrons(mean_e: Tensor, correlation: Tensor, per_correlation_e: Tensor) -> Tensor:
     """Mean charge of both taps in one sample, `(S + B) / 2 +- m C_k / 2`.
 
     Parameters
     ----------
-    mean_e : [B, 1, H, W]
+    mean_e : [B, H, W]
         Half of the electrons over both taps, (S + B) / 2.
-    half_modulated_e : [B, n, H, W]
-        Half of the demodulated electrons, m C_k / 2.
+    correlation : [B, H, W]
+        Correlation of the light with the sample's demodulation, in any unit.
+    per_correlation_e : [B, 2, 1, 1]
+        Electrons of tap A and, negative, of tap B per unit of `correlation`.
 
     Returns
     -------
-    [B, n, 2, H, W]
+    [B, 2, H, W]
         Electrons of tap A and tap B, not negative.
     """
-    batch, samples, height, width = half_modulated_e.shape
-    taps = mean_e.new_empty(batch, samples, 2, height, width)
-    torch.add(mean_e, half_modulated_e, out=taps[:, :, 0])
-    torch.sub(mean_e, half_modulated_e, out=taps[:, :, 1])
-    return taps.clamp_(min=0.0)
+    taps_e = torch.addcmul(mean_e.unsqueeze(1), correlation.unsqueeze(1), per_correlation_e)
+    return taps_e.clamp_(min=0.0)
 
 
 def add_noise(charge_e: Tensor, normals: Tensor, read_noise_e: float) -> Tensor:
-    """Charge with shot and read noise: one normal per packet, variance `charge + read^2`.
+    """Shot and read noise added in place: one normal per packet, variance `charge + read^2`.
 
     The normal distribution stands for Poisson's: one variate per packet keeps the noise stream
     in step whatever the light is.
     """
     sigma_e = (charge_e + read_noise_e**2).sqrt_()
-    return sigma_e.mul_(normals).add_(charge_e)
+    return charge_e.addcmul_(sigma_e, normals)
 
 
 def clip_to_full_well(charge_e: Tensor, full_well_e: float) -> Tensor:

@@ -54,6 +54,6 @@ def ambient_offset_lsb(ambient_e: Tensor, sensor: SensorConfig) -> Tensor:
     ambient alone fills a tap, and no more.
     """
     filled = (0.5 / sensor.full_well_e * ambient_e).clamp_(max=1.0)
-    filled[:, 0::2] *= sensor.offset_ambient_lsb
-    filled[:, 1::2] *= -sensor.offset_ambient_lsb
-    return filled
+    rows = torch.full((ambient_e.shape[-2], 1), sensor.offset_ambient_lsb)
+    rows[1::2].neg_()
+    return filled.mul_(rows)
