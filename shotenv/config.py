@@ -17,8 +17,27 @@ Range = tuple[float, float]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-Family = Literal["sunny_road", "overcast_street", "garage", "tunnel", "night_road"]
+Split = Literal["train", "validation", "test", "shift"]
+Family = Literal[
+    "sunny_road",
+    "overcast_street",
+    "garage",
+    "tunnel",
+    "night_road",
+    "warehouse",
+    "construction_site",
+    "forest_path",
+    "snowy_street",
+]
 FAMILIES: tuple[Family, ...] = ("sunny_road", "overcast_street", "garage", "tunnel", "night_road")
+SHIFT_FAMILIES: tuple[Family, ...] = (
+    "warehouse",
+    "construction_site",
+    "forest_path",
+    "snowy_street",
+)
+"""Held out: other geometry, materials and light, and kinds of things that FAMILIES never show."""
+
 
 ROOM_K = 298.15
 """25 C, at which data sheets state the efficiency of a light source."""
@@ -203,7 +222,9 @@ class WorldConfig(Section):
 class BankConfig(Section):
     """A bank of rendered clips: which worlds, how many of each family per split."""
 
-    name: str = Field(description="name of the bank and of its folder in the cache")
+    name: str = Field(
+        pattern=r"^[A-Za-z0-9_-]{1,80}$", description="name of the bank and of its folder"
+    )
     sensor: SensorConfig
     camera: CameraConfig = CameraConfig()
     world: WorldConfig = WorldConfig()
@@ -211,6 +232,33 @@ class BankConfig(Section):
     train_clips: int = Field(8, ge=0, description="training clips of each family")
     validation_clips: int = Field(3, ge=0, description="validation clips of each family")
     test_clips: int = Field(3, ge=0, description="test clips of each family")
+    shift_clips: int = Field(0, ge=0, description="clips of each held-out family")
+
+    @property
+    def clips(self) -> dict[Split, tuple[int, tuple[Family, ...]]]:
+        """Split to the number of clips of each of its families, and those families."""
+        seen = self.world.families
+        return {
+            "train": (self.train_clips, seen),
+            "validation": (self.validation_clips, seen),
+            "test": (self.test_clips, seen),
+            "shift": (self.shift_clips, SHIFT_FAMILIES),
+        }
+
+    @model_validator(mode="after")
+    def _consistent(self) -> BankConfig:
+        if not any(count for count, _ in self.clips.values()):
+            raise ValueError(
+                "train_clips, validation_clips, test_clips and shift_clips are all 0; expected "
+                "at least one clip"
+            )
+        held_out = sorted(set(self.world.families) & set(SHIFT_FAMILIES))
+        if self.shift_clips and held_out:
+            raise ValueError(
+                f"world.families has {', '.join(held_out)}, which shift_clips = "
+                f"{self.shift_clips} holds out; expected other families, or shift_clips = 0"
+            )
+        return self
 
 
 class RewardConfig(Section):
@@ -231,8 +279,8 @@ class EnvConfig(Section):
     sensor: SensorConfig
     laser: LaserConfig
     bank: str = Field("starter", description="name or path of a bank")
-    split: Literal["train", "validation", "test", "all"] = Field(
-        "train", description="clips that drives are made of"
+    split: Literal[Split, "all"] = Field(
+        "train", description="clips that drives are made of; all: those of no held-out family"
     )
     unwrapper: str = Field("tofregnet", description="name or path of an unwrapping network")
     merge: Literal["nearest", "floor"] = Field(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -22,7 +23,15 @@ from shotenv.bank.store import (
     write_clip,
     write_manifest,
 )
-from shotenv.config import BankConfig, find_config, merged, read_config
+from shotenv.config import (
+    FAMILIES,
+    SHIFT_FAMILIES,
+    BankConfig,
+    ConfigError,
+    find_config,
+    merged,
+    read_config,
+)
 
 FRAMES, HEIGHT, WIDTH = 3, 6, 8
 
@@ -45,14 +54,23 @@ def clip_metadata(name: str, seed: int, split: str = "train") -> dict[str, objec
     )
 
 
+def write_small_bank(folder, splits):
+    records = [
+        write_clip(folder / "clips" / f"c{i}", clip_arrays(i), clip_metadata(f"c{i}", i, split))
+        for i, split in enumerate(splits)
+    ]
+    write_manifest(folder, "small", records, (HEIGHT, WIDTH))
+    return folder
+
+
 @pytest.fixture
 def bank_folder(tmp_path):
-    records = [
-        write_clip(tmp_path / "clips" / f"c{i}", clip_arrays(i), clip_metadata(f"c{i}", i, split))
-        for i, split in enumerate(("train", "train", "test"))
-    ]
-    write_manifest(tmp_path, "small", records, (HEIGHT, WIDTH))
-    return tmp_path
+    return write_small_bank(tmp_path, ("train", "train", "test"))
+
+
+@pytest.fixture
+def shifted_bank(tmp_path):
+    return write_small_bank(tmp_path, ("train", "train", "train", "test", "shift"))
 
 
 def test_what_is_written_is_read_back(bank_folder):
@@ -94,8 +112,37 @@ def test_splits(bank_folder):
     bank = open_bank(bank_folder)
     assert [clip.name for clip in bank.splits("test")] == ["c2"]
     assert len(bank.splits("all")) == 3
-    with pytest.raises(BankError, match="validation"):
+    with pytest.raises(BankError, match=r"'validation', but bank .* only has train, test; choose"):
         bank.splits("validation")
+
+
+def test_all_leaves_the_shift_split_out(shifted_bank):
+    bank = open_bank(shifted_bank)
+    assert [clip.split for clip in bank.splits("all")] == ["train"] * 3 + ["test"]
+    assert [clip.name for clip in bank.splits("shift")] == ["c4"]
+    assert bank.frames("shift").tolist() == list(range(4 * FRAMES, 5 * FRAMES))
+
+
+def test_a_bank_without_shift_clips_says_so(bank_folder):
+    with pytest.raises(BankError, match=r"'shift', but bank .* only has train, test"):
+        open_bank(bank_folder).splits("shift")
+
+
+def test_frames_by_clip_are_those_of_the_clips(bank_folder):
+    bank = open_bank(bank_folder)
+    assert bank.frames("train").tolist() == list(range(2 * FRAMES))
+    assert bank.frames("test").tolist() == list(range(2 * FRAMES, 3 * FRAMES))
+
+
+def test_frames_by_frame_are_dealt_at_random_without_the_shift(shifted_bank):
+    bank = open_bank(shifted_bank)
+    parts = {name: bank.frames(name, by="frame") for name in ("train", "validation", "test")}
+    assert [len(part) for part in parts.values()] == [10, 1, 1]
+    assert sorted(torch.cat(list(parts.values())).tolist()) == list(range(4 * FRAMES))
+    assert torch.equal(bank.frames("train", by="frame"), parts["train"])
+    assert bank.frames("train", by="frame", seed=1).tolist() != parts["train"].tolist()
+    with pytest.raises(BankError, match="'shift'; by frame"):
+        bank.frames("shift", by="frame")
 
 
 @pytest.mark.parametrize("index", [-1, 9])
@@ -209,26 +256,73 @@ def test_unknown_bank_names_the_known_ones():
 @pytest.fixture
 def config():
     starter = read_config(BankConfig, find_config("bank", "starter"))
-    return merged(starter, {"train_clips": 1, "validation_clips": 1, "test_clips": 1})
+    counts = ("train_clips", "validation_clips", "test_clips", "shift_clips")
+    return merged(starter, dict.fromkeys(counts, 1))
 
 
 def test_clip_jobs_cover_every_family_and_split_with_seeds_of_their_own(config, tmp_path):
     jobs = clip_jobs(config, tmp_path)
-    assert len({job.seed for job in jobs}) == len(jobs) == 15
+    assert len({job.seed for job in jobs}) == len(jobs) == 15 + len(SHIFT_FAMILIES)
     assert {(job.split, job.family) for job in jobs} == {
         (split, family)
         for split in ("train", "validation", "test")
         for family in config.world.families
+    } | {("shift", family) for family in SHIFT_FAMILIES}
+
+
+def test_shift_clips_leave_the_other_clips_as_they_were(config, tmp_path):
+    without = clip_jobs(merged(config, {"shift_clips": 0}), tmp_path)
+    kept = clip_jobs(config, tmp_path)[: len(without)]
+    assert [(j.name, j.seed) for j in kept] == [(j.name, j.seed) for j in without]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            dict.fromkeys(("train_clips", "validation_clips", "test_clips", "shift_clips"), 0),
+            "at least one clip",
+        ),
+        ({"shift_clips": -1}, "shift_clips"),
+        ({"shift_clips": 1.5}, "shift_clips"),
+        ({"world": {"families": ["garage", SHIFT_FAMILIES[0]]}}, f"{SHIFT_FAMILIES[0]}, which"),
+        ({"name": "../elsewhere"}, "name"),
+        ({"camera": {"width": 0}}, "camera.width"),
+    ],
+)
+def test_impossible_banks_are_refused(config, change, message):
+    with pytest.raises(ConfigError, match=message):
+        merged(config, change)
+
+
+def test_held_out_families_may_be_trained_on_where_none_is_held_out(config):
+    families = (*FAMILIES, *SHIFT_FAMILIES)
+    opened = merged(config, {"world": {"families": families}, "shift_clips": 0})
+    assert opened.clips["train"] == (1, families)
+
+
+def test_nearfield_is_of_the_papers_size_and_splits_80_10_10():
+    config = read_config(BankConfig, find_config("bank", "nearfield"))
+    jobs = clip_jobs(config, find_config("bank", "nearfield"))
+    frames = Counter(job.split for job in jobs)
+    per_clip = config.world.frames_per_clip
+    assert {split: count * per_clip for split, count in frames.items()} == {
+        "train": 1600,
+        "validation": 200,
+        "test": 200,
+        "shift": 48,
     }
+    assert len(jobs) * per_clip == 2048
+    assert (config.camera.width, config.camera.height) == (320, 240)
+    assert len(set(Counter(j.family for j in jobs if j.split == "test").values())) == 1
 
 
 def test_shipped_banks_share_no_world():
-    seeds = {}
-    for name in ("starter", "training"):
+    seeds = []
+    for name in ("starter", "training", "nearfield"):
         bank = read_config(BankConfig, find_config("bank", name))
-        seeds[name] = {job.seed for job in clip_jobs(bank, find_config("bank", name))}
-    assert not seeds["starter"] & seeds["training"]
-    assert len(seeds["training"]) >= 1500
+        seeds += [job.seed for job in clip_jobs(bank, find_config("bank", name))]
+    assert len(set(seeds)) == len(seeds) >= 2000
 
 
 @pytest.mark.parametrize(
@@ -275,6 +369,7 @@ def test_building_resumes_and_gives_a_whole_bank(config, tmp_path):
         {
             "camera": {"width": 32, "height": 24, "samples_per_pixel": 1, "gray_instants": 1},
             "world": {"frames_per_clip": 2, "families": ["garage"]},
+            "shift_clips": 0,
         },
     )
     folder = build_bank(small, tmp_path / "bank", workers=1)

@@ -19,17 +19,16 @@ from shotenv.bank.store import (
     MANIFEST,
     BankError,
     ClipRecord,
-    Split,
     frame_bytes,
     read_clip_record,
     write_clip,
     write_manifest,
 )
-from shotenv.config import BankConfig, Family
+from shotenv.config import BankConfig, Family, Split
 from shotenv.progress import progress, say
 from unwrap.files import write_json
 
-RENDERING_VERSION = 1
+RENDERING_VERSION = 2
 """Raised when the same configuration would give other light: old banks are then left alone."""
 
 SECONDS_PER_MILLION_RAYS = 0.5
@@ -65,17 +64,12 @@ class ClipJob:
 
 
 def clip_jobs(config: BankConfig, folder: Path) -> tuple[ClipJob, ...]:
-    """Clips of a bank in their order: split by split, family by family."""
-    counts: dict[Split, int] = {
-        "train": config.train_clips,
-        "validation": config.validation_clips,
-        "test": config.test_clips,
-    }
+    """Clips of a bank in their order: split by split, family by family, the held-out ones last."""
     kinds = [
         (split, family)
-        for split, count in counts.items()
+        for split, (count, families) in config.clips.items()
         for _ in range(count)
-        for family in config.world.families
+        for family in families
     ]
     return tuple(
         _job(config, folder, number, split, family) for number, (split, family) in enumerate(kinds)

@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from shotenv.bank.store import ARRAYS, BankError, Manifest, Split, read_manifest
+from shotenv.bank.store import ARRAYS, BankError, Manifest, read_manifest
+from shotenv.config import Split
 from shotenv.frames import Exposure
+from unwrap.splits import RANDOM_SPLITS, random_split
 
 OPEN_CLIPS = 128
 """Clips kept mapped at a time; each holds one file descriptor per array."""
@@ -102,18 +105,47 @@ class Bank:
         return self.manifest.fingerprint
 
     def splits(self, split: str) -> tuple[Clip, ...]:
-        """Clips of one split; "all" gives every clip.
+        """Clips of one split; "all" gives every clip but those of the shift split.
 
         Raises
         ------
         BankError
             The bank has no clip in that split.
         """
-        chosen = tuple(clip for clip in self.clips if split in (clip.split, "all"))
+        wanted = RANDOM_SPLITS if split == "all" else (split,)
+        chosen = tuple(clip for clip in self.clips if clip.split in wanted)
         if not chosen:
-            known = sorted({clip.split for clip in self.clips})
-            raise BankError(f"split is {split!r}, but bank {self.folder} only has {known}")
+            known = ", ".join(dict.fromkeys(clip.split for clip in self.clips))
+            raise BankError(
+                f"split is {split!r}, but bank {self.folder} only has {known}; choose "
+                "one of these, or render a bank with clips of that split"
+            )
         return chosen
+
+    def frames(self, split: str, *, by: Literal["clip", "frame"] = "clip", seed: int = 0) -> Tensor:
+        """Indices int64 [N] of the frames of one split, ascending.
+
+        Parameters
+        ----------
+        split : str
+            As in `splits`.
+        by : "clip" or "frame"
+            Those of whole clips; or the paper's random split, 80/10/10 of all frames but those of
+            the shift split, in which neighbouring frames come to lie on both sides.
+        seed : int
+            Of the random split.
+
+        Raises
+        ------
+        BankError
+            The bank has no frame in that split.
+        """
+        if by == "clip":
+            return _indices(self.splits(split))
+        if split not in RANDOM_SPLITS:
+            raise BankError(f"split is {split!r}; by frame, expected one of {RANDOM_SPLITS}")
+        pool = _indices(self.splits("all"))
+        return pool[torch.from_numpy(random_split(len(pool), seed=seed)[split])]
 
     def clip_of(self, index: int) -> Clip:
         """Clip that frame `index` belongs to."""
@@ -166,6 +198,10 @@ class Bank:
         if not 0 <= index < len(self):
             raise IndexError(f"frame index is {index}; expected 0..{len(self) - 1}")
         return index
+
+
+def _indices(clips: tuple[Clip, ...]) -> Tensor:
+    return torch.cat([torch.arange(clip.start, clip.start + clip.frames) for clip in clips])
 
 
 def _clips(manifest: Manifest) -> tuple[Clip, ...]:

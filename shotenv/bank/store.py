@@ -22,13 +22,12 @@ from typing import Any, Final, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from shotenv.config import BankConfig, one_sentence
+from shotenv.config import BankConfig, Split, one_sentence
 from unwrap.files import write_json
 
 SCHEMA_VERSION: Final = 1
 MANIFEST = "manifest.json"
 LARGEST_JSON_BYTES = 64 * 2**20
-Split = Literal["train", "validation", "test"]
 
 
 class BankError(ValueError):
