@@ -13,4 +13,4 @@ thermal_step = case_step
 
 __all__ = ["LaserState", "ageing_rate", "case_step", "efficiency_at", "emitted_power_w"]
 __all__ += ["junction_step", "laser_step", "relaxed", "shot_cost"]
-__all__ += ["start_laser", "too_bright", "thermal_step", "trip_step"]
+__all__ += ["start_laser", "thermal_step", "too_bright", "trip_step"]
