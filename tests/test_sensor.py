@@ -114,7 +114,7 @@ def test_full_well_clips_each_tap_before_the_difference(sensor):
 def test_converter_rounds_and_clips(sensor):
     loud = merged(sensor, {"gain_lsb_per_e": 10.0, "full_well_e": 1e9, **QUIET})
     raw = noise_free(wall(sensor, 0.0, radiance=0.01), loud)
-    assert raw.dcs_lsb.min() == -2047 and raw.dcs_lsb.max() == 2046
+    assert raw.dcs_lsb.min() == -2048 and raw.dcs_lsb.max() == 2047
     assert raw.saturated.all()
     assert digitise(torch.tensor([0.5, 1.5, -0.5, 7.2]), -2.0, 5.0).tolist() == [0.0, 2.0, 0.0, 5.0]
 

@@ -149,8 +149,8 @@ def slow_reference(exposure, sensor, noise, pattern, y, x):
         rises = sensor.offset_ambient_lsb * min(ambient / 2 / sensor.full_well_e, 1.0)
         offset = float(pattern.pattern_lsb[0, y, x]) + parity * rises
         word = round((taps[0] - taps[1]) * sensor.gain_lsb_per_e + offset)
-        samples.append(min(max(word, -2047), 2046))
-        saturated |= not -2047 < word < 2046
+        samples.append(min(max(word, -2048), 2047))
+        saturated |= not -2047 <= word <= 2046
     return samples, saturated
 
 

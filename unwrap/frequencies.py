@@ -1,0 +1,53 @@
+"""What two modulation frequencies can tell apart: ranges before the phases repeat. Plain Python."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+SPEED_OF_LIGHT_M_S = 299_792_458.0
+GRID_HZ = 1000
+"""Frequencies are compared on this grid; oscillators are no more exact than that."""
+
+
+def unambiguous_range_m(frequency_hz: float) -> float:
+    """Distance after which the phase repeats: d_u = c / (2 f).
+
+    Examples
+    --------
+    >>> round(unambiguous_range_m(24e6), 4)
+    6.2457
+    """
+    return SPEED_OF_LIGHT_M_S / (2 * frequency_hz)
+
+
+def joint_range_m(f1_hz: float, f2_hz: float) -> float:
+    """Distance after which both phases repeat: c / (2 gcd(f1, f2)), with the frequencies in kHz.
+
+    Examples
+    --------
+    >>> round(joint_range_m(24e6, 10e6), 2)
+    74.95
+    """
+    common = math.gcd(*(max(1, round(f / GRID_HZ)) for f in (f1_hz, f2_hz)))
+    return unambiguous_range_m(common * GRID_HZ)
+
+
+def candidate_spacing_m(f1_hz: float, f2_hz: float, max_range_m: float) -> float:
+    """Smallest difference of the disagreements of two wrap candidates of f1 within a range.
+
+    Candidate n of f1 lies n d_u1 further, which is n d_u1 mod d_u2 at f2. Two frequencies tell
+    neighbouring candidates apart while they disagree by less than half of this distance.
+
+    Examples
+    --------
+    >>> round(candidate_spacing_m(24e6, 10e6, 25.0), 2)
+    2.5
+    >>> round(candidate_spacing_m(24e6, 10e6, 74.0), 2)
+    1.25
+    """
+    range1_m, range2_m = unambiguous_range_m(f1_hz), unambiguous_range_m(f2_hz)
+    wraps = range(math.floor(max_range_m / range1_m) + 1)
+    places = sorted(n * range1_m / range2_m % 1.0 for n in wraps)
+    gaps = (b - a for a, b in itertools.pairwise([*places, places[0] + 1.0]))
+    return range2_m * min(gaps)
