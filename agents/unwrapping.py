@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from itertools import islice
 from typing import Any, Final
 
 import torch
@@ -45,7 +46,7 @@ def _clip_scores(problem: Problem, clip: Clip) -> list[Scores]:
     scores = []
     for place in range(clip.frames):
         step = torch.tensor([place])
-        noise = noise_of(drive, step, Shots.EIGHT, bank.height, bank.width)
+        noise = list(islice(noise_of(drive, step, bank.height, bank.width), Shots.EIGHT))
         made = {shots: acquire_depth(problem, drive, step, shots, noise) for shots in Shots}
         one = made[Shots.EIGHT]
         scores.append(

@@ -7,6 +7,7 @@ import os
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from statistics import median
 from time import thread_time
@@ -17,7 +18,7 @@ import torch
 from shotenv.bank.store import write_clip, write_manifest
 from shotenv.core import open_problem, reset, step
 from shotenv.resolve import env_config
-from shotenv.sensor import draw_noise
+from shotenv.sensor import noise_samples
 from shotenv.vector_env import ShotScheduleVectorEnv
 from unwrap.acquisition import Shots
 from unwrap.nets import TofRegNet
@@ -82,7 +83,8 @@ def single(fields: dict[str, object], shots: Shots) -> dict:
         state["now"], _ = step(problem, replace(state["now"], temperature_k=cold), action)
 
     def least() -> None:
-        draw_noise(0, 0, shots, HEIGHT, WIDTH)
+        for _ in islice(noise_samples([0], [0], HEIGHT, WIDTH), shots):
+            pass
         torch.atan2(pixels[0], pixels[1])
 
     step_s, least_s = alternately(play, least)

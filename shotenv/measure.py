@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import torch
@@ -14,7 +15,7 @@ from shotenv.sensor import (
     Electrons,
     acquire,
     collect,
-    draw_noise,
+    noise_samples,
     sample_noise_lsb,
     single_sample_snr,
 )
@@ -64,23 +65,24 @@ class Measured:
     seen: Tensor
 
 
-def noise_of(drive: Drive, step: Tensor, shots: Shots, height: int, width: int) -> Tensor:
-    """Normals [B, n, 2, H, W] of the frames at `step` [B]; each drive has its own stream."""
-    keys = zip(drive.seed.tolist(), step.tolist(), strict=True)
-    drawn = [draw_noise(seed, frame, shots, height, width) for seed, frame in keys]
-    return drawn[0].unsqueeze(0) if len(drawn) == 1 else torch.stack(drawn)
+def noise_of(drive: Drive, step: Tensor, height: int, width: int) -> Iterator[Tensor]:
+    """Normals [B, 2, H, W], sample after sample, of the frames at `step` [B].
+
+    Each drive has its own stream.
+    """
+    return noise_samples(drive.seed.tolist(), step.tolist(), height, width)
 
 
 def acquire_depth(
-    problem: Problem, drive: Drive, step: Tensor, shots: Shots, noise: Tensor | None = None
+    problem: Problem, drive: Drive, step: Tensor, shots: Shots, noise: Iterable[Tensor] | None = None
 ) -> Acquisition:
     """Acquire and correct the frames at `step` [B] of `drive` with `shots` samples each.
 
-    `noise` [B, n, 2, H, W], n >= shots, is drawn from the drive's own stream where it is None.
+    `noise` gives the normals [B, 2, H, W] of each sample; None draws the drive's own.
     """
     bank, sensor, frames = problem.bank, problem.config.sensor, drive.frame(step)
     if noise is None:
-        noise = noise_of(drive, step, shots, bank.height, bank.width)
+        noise = noise_of(drive, step, bank.height, bank.width)
     exposure = bank.exposure(frames)
     electrons = collect(exposure, sensor, drive.laser_power_w, drive.integration_s)
     raw = acquire(electrons, sensor, shots=shots, noise=noise, offsets=drive.offsets)
@@ -90,7 +92,7 @@ def acquire_depth(
     )
     depth = correct(
         raw,
-        Prediction(prediction_m, prediction_m),
+        Prediction(prediction_m),
         problem.description,
         merge=problem.config.merge,
         # Four samples of a frequency cancel the offset by themselves.
@@ -110,7 +112,7 @@ def scored_pixels(electrons: Electrons, truth_m: Tensor, problem: Problem) -> Te
 
 
 def measure(
-    problem: Problem, drive: Drive, step: Tensor, shots: Shots, noise: Tensor | None = None
+    problem: Problem, drive: Drive, step: Tensor, shots: Shots, noise: Iterable[Tensor] | None = None
 ) -> Measured:
     """Acquire, correct and score the frames at `step` [B] of `drive`."""
     made = acquire_depth(problem, drive, step, shots, noise)

@@ -48,7 +48,7 @@ def frame_sums(*maps: Tensor) -> Tensor:
     Row by row, because a sum over a whole frame at once is split among threads, and then its
     last bit depends on how many there are.
     """
-    return torch.stack([values.sum(dim=-1) for values in maps]).to(torch.float64).sum(dim=-1)
+    return torch.stack([values.sum(dim=-1) for values in maps]).sum(dim=-1, dtype=torch.float64)
 
 
 FARTHEST_ERROR_M = 1e9
@@ -82,17 +82,14 @@ def score_depth(
         error_m.mul(good_error_m),
         error_m.lt_(0.5 * unambiguous_m).mul_(good),
     )
-    scored_count, good_count, bounded, absolute_m, squared_m2, right_count = sums
-    nothing, none_good = scored_count == 0, good_count == 0
-    divisor, good_divisor = scored_count.clamp(min=1), good_count.clamp(min=1)
-    shares = torch.stack((good_count, right_count)) / divisor
-    valid_share, wrap_accuracy = shares.masked_fill_(nothing, 1.0)
+    count, bounded, absolute_m, squared_m2, right = sums[:2], *sums[2:].unbind()
+    (nothing, none_good), (divisor, good_divisor) = count == 0, count.clamp(min=1)
     return DepthScore(
         error=bounded / divisor,
         depth_mae_m=(absolute_m / good_divisor).masked_fill_(none_good, range_m),
         depth_rmse_m=(squared_m2 / good_divisor).sqrt_().masked_fill_(none_good, range_m),
-        wrap_accuracy=wrap_accuracy,
-        valid_share=valid_share,
+        wrap_accuracy=(right / divisor).masked_fill_(nothing, 1.0),
+        valid_share=(count[1] / divisor).masked_fill_(nothing, 1.0),
     )
 
 

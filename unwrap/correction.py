@@ -65,12 +65,13 @@ class Prediction:
     ----------
     distance_m : float32 [B, H, W]
         Coarse distance, metres.
-    confidence : float32 [B, H, W]
-        0..1, see `unwrap.unwrapper.Unwrapper.predict`.
+    confidence : float32 [B, H, W] or None
+        0..1, see `unwrap.unwrapper.Unwrapper.predict`; None where it is not known. Correction
+        does not need it.
     """
 
     distance_m: Tensor
-    confidence: Tensor
+    confidence: Tensor | None = None
 
 
 def correct(
@@ -111,7 +112,8 @@ def correct(
     first = decode(raw.dcs_lsb[:, :SAMPLES_PER_FREQUENCY], offset_lsb=offset_lsb)
     noise = sensor.noise_lsb if noise_lsb is None else noise_lsb
     # Weights 0 and 1 in floats: comparing into a bool and converting it is several times slower.
-    valid = (first.amplitude - sensor.min_snr * noise).ge_(0).mul_(weights_of(~raw.saturated))
+    valid = torch.sub(first.amplitude, noise, alpha=sensor.min_snr).ge_(0)
+    valid.mul_(weights_of(~raw.saturated))
     if raw.shots == Shots.EIGHT:
         second = decode(raw.dcs_lsb[:, SAMPLES_PER_FREQUENCY:], offset_lsb=offset_lsb)
         merged_m, residual_m = unwrap_dual(
@@ -153,12 +155,10 @@ def _frame(
     prediction: Prediction | None,
     sensor: SensorDescription,
 ) -> DepthFrame:
-    """Depth with the guess where the weight `valid` is 0, and its whole wraps (0 where NaN)."""
-    per_wrap = 1 / unambiguous_range_m(sensor.f1_hz)
+    """Depth with the guess, or NaN without one, where the weight `valid` is 0."""
     if prediction is None:
         depth_m = merged_m.masked_fill_(valid == 0, torch.nan)
-        wraps = depth_m.mul(per_wrap).nan_to_num_()
     else:
         depth_m = prediction.distance_m.lerp(merged_m, valid)
-        wraps = depth_m.mul(per_wrap)
-    return DepthFrame(depth_m, wraps.long(), valid.bool(), first.amplitude, first.residual)
+    unambiguous_m = unambiguous_range_m(sensor.f1_hz)
+    return DepthFrame(depth_m, valid.bool(), first.amplitude, first.residual, unambiguous_m)

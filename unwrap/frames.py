@@ -60,18 +60,23 @@ class DepthFrame:
     distance_m : float32 [B, H, W]
         Radial distance in metres; where `valid` is false it is the best guess there is
         (the network's prediction) or NaN where there is none.
-    wraps : int64 [B, H, W]
-        Number of whole unambiguous ranges at f1 in `distance_m`.
     valid : bool [B, H, W]
         Signal strong enough, not saturated, frequencies agree.
     amplitude : float32 [B, H, W]
         Amplitude of the correlation at f1, in the unit of the samples.
     residual : float32 [B, H, W] or None
         Of the opposite samples at f1, see `PhaseFrame`; None with two samples.
+    unambiguous_m : float
+        Unambiguous range at f1, metres.
     """
 
     distance_m: Tensor
-    wraps: Tensor
     valid: Tensor
     amplitude: Tensor
     residual: Tensor | None
+    unambiguous_m: float
+
+    @property
+    def wraps(self) -> Tensor:
+        """Whole unambiguous ranges at f1 in `distance_m`, int64 [B, H, W]; 0 where it is NaN."""
+        return self.distance_m.mul(1 / self.unambiguous_m).nan_to_num_().long()

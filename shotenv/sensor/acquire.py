@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import reduce
+from itertools import repeat
 
 import torch
 from torch import Tensor
@@ -59,7 +60,8 @@ def expose(
     check_exposure(exposure, shots)
     check_settings(exposure, shots, laser_power_w, integration_s, noise)
     electrons = collect(exposure, sensor, laser_power_w, integration_s)
-    return acquire(electrons, sensor, shots=shots, noise=noise, offsets=offsets)
+    samples = None if noise is None else noise.unbind(1)
+    return acquire(electrons, sensor, shots=shots, noise=samples, offsets=offsets)
 
 
 @dataclass(frozen=True)
@@ -99,12 +101,13 @@ def acquire(
     sensor: SensorConfig,
     *,
     shots: Shots,
-    noise: Tensor | None,
+    noise: Iterable[Tensor] | None,
     offsets: OffsetPattern | None,
 ) -> RawFrame:
     """Noise, full well and converter for charge that is known to be sound; see `expose`.
 
-    Sample after sample, so that what one sample needs stays in the processor's cache.
+    Sample after sample, so that what one sample needs stays in the processor's cache; `noise`
+    gives the normals [B, 2, H, W] of each.
     """
     mean_e = (electrons.active_e + electrons.ambient_e).mul_(0.5)
     half_modulation = mean_e.new_tensor([0.5, -0.5]).view(2, 1, 1).mul_(sensor.contrast)
@@ -113,22 +116,29 @@ def acquire(
     batch, _, height, width = electrons.correlation.shape
     dcs_lsb = mean_e.new_empty(batch, int(shots), height, width)
     fullest_e = []
-    for sample, sample_lsb in enumerate(dcs_lsb.unbind(1)):
-        taps_e = tap_electrons(mean_e, electrons.correlation[:, sample], per_correlation_e)
-        if noise is not None:
-            add_noise(taps_e, noise[:, sample], sensor.read_noise_e)
-        held_e = clip_to_full_well(taps_e, sensor.full_well_e)
-        read_out(held_e, pattern_lsb, sensor, out=sample_lsb)
-        fullest_e.append(torch.maximum(held_e[:, 0], held_e[:, 1]))
+    samples = zip(
+        dcs_lsb.unbind(1),
+        electrons.correlation.unbind(1),
+        repeat(None) if noise is None else noise,
+        strict=False,
+    )
+    for sample_lsb, correlation, normals in samples:
+        taps_e = tap_electrons(mean_e, correlation, per_correlation_e)
+        if normals is not None:
+            add_noise(taps_e, normals, sensor.read_noise_e)
+        tap_a_e, tap_b_e = clip_to_full_well(taps_e, sensor.full_well_e).unbind(1)
+        read_out(tap_a_e - tap_b_e, pattern_lsb, sensor, out=sample_lsb)
+        fullest_e.append(torch.maximum(tap_a_e, tap_b_e))
     return RawFrame(dcs_lsb, _saturated(fullest_e, dcs_lsb, sensor))
 
 
-def read_out(held_e: Tensor, pattern_lsb: Tensor, sensor: SensorConfig, *, out: Tensor) -> None:
-    """Signed words [B, H, W] of the charge that the taps hold, [B, 2, H, W] electrons.
+def read_out(
+    difference_e: Tensor, pattern_lsb: Tensor, sensor: SensorConfig, *, out: Tensor
+) -> None:
+    """Signed words [B, H, W] of a sample, the difference of its taps in electrons.
 
-    The taps' difference, then gain, offset, rounding and the converter's range.
+    Gain, offset, rounding and the converter's range.
     """
-    difference_e = held_e[:, 0] - held_e[:, 1]
     torch.add(pattern_lsb, difference_e, alpha=sensor.gain_lsb_per_e, out=out)
     digitise(out, *signed_limits_lsb(sensor.adc_bits))
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Iterator, Sequence
+from itertools import islice
 
 import torch
 from torch import Tensor
@@ -43,18 +45,27 @@ def stream(purpose: Purpose, *words: int) -> torch.Generator:
     return torch.Generator().manual_seed(stream_seed(purpose, *words))
 
 
-def draw_noise(seed: int, frame: int, shots: int, height: int, width: int) -> Tensor:
-    """Standard normals of one acquisition: tap A and tap B of each sample.
+def noise_samples(
+    seeds: Sequence[int], frames: Sequence[int], height: int, width: int
+) -> Iterator[Tensor]:
+    """Standard normals of a batch of acquisitions, sample after sample without end.
 
-    The stream belongs to (seed, frame) and each sample is one call, so that the noise of fewer
-    shots is a prefix of the noise of more.
+    Each stream belongs to its (seed, frame), and each sample is one draw from it, so that the
+    noise of fewer shots is a prefix of the noise of more.
 
-    Returns
-    -------
-    float32 [shots, 2, height, width]
+    Yields
+    ------
+    float32 [B, 2, height, width]
+        Of tap A and tap B, one sample for each of the B pairs of `seeds` and `frames`.
     """
-    normals = torch.empty(int(shots), 2, height, width)
-    generator = stream(Purpose.NOISE, seed, frame)
-    for sample in normals:
-        sample.normal_(generator=generator)
-    return normals
+    streams = [stream(Purpose.NOISE, *words) for words in zip(seeds, frames, strict=True)]
+    while True:
+        normals = torch.empty(len(streams), 2, height, width)
+        for one, generator in zip(normals, streams, strict=True):
+            one.normal_(generator=generator)
+        yield normals
+
+
+def draw_noise(seed: int, frame: int, shots: int, height: int, width: int) -> Tensor:
+    """Standard normals of one acquisition, float32 [shots, 2, height, width]; see above."""
+    return torch.cat(list(islice(noise_samples([seed], [frame], height, width), int(shots))))

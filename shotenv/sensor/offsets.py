@@ -32,19 +32,29 @@ class OffsetPattern:
 
 
 def draw_offsets(
-    sensor: SensorConfig, height: int, width: int, *, generator: torch.Generator
+    sensor: SensorConfig,
+    height: int,
+    width: int,
+    *,
+    generator: torch.Generator,
+    imager_k: float | None = None,
 ) -> OffsetPattern:
     """Offset pattern of one sensor, batch of one: a part common to each row and a part per pixel.
 
     `offset_row_share` of the variance is the row's. The stored map knows
-    `offset_calibrated_share` of the pattern.
+    `offset_calibrated_share` of the pattern as it was at the calibration temperature. An imager
+    at `imager_k` kelvin (None: at that temperature) adds a pattern that no map knows, of its own
+    for each pixel and proportional to the difference of temperature.
     """
     row = torch.randn(height, 1, generator=generator)
     pixel = torch.randn(height, width, generator=generator)
     share = sensor.offset_row_share
     unit = math.sqrt(share) * row + math.sqrt(1.0 - share) * pixel
     pattern = (sensor.offset_std_lsb * unit).unsqueeze(0)
-    return OffsetPattern(pattern, sensor.offset_calibrated_share * pattern)
+    warmer_k = 0.0 if imager_k is None else imager_k - sensor.calibration_temperature_k
+    drift = torch.randn(height, width, generator=generator)
+    drift.mul_(sensor.offset_drift_lsb_per_k * warmer_k)
+    return OffsetPattern(pattern + drift, sensor.offset_calibrated_share * pattern)
 
 
 def ambient_offset_lsb(ambient_e: Tensor, sensor: SensorConfig) -> Tensor:
