@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
-Range = tuple[float, float]
-Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+from shotenv.section import Fraction, NonNegative, Positive, Range, Section, check_range
+from shotenv.sensor_config import SensorConfig
+
 Split = Literal["train", "validation", "test", "shift"]
 Family = Literal[
     "sunny_road",
@@ -45,75 +44,6 @@ ROOM_K = 298.15
 
 class ConfigError(ValueError):
     """A configuration that cannot be used; the message names field, value and expectation."""
-
-
-class Section(BaseModel):
-    """Base of every section: frozen, and unknown keys are refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-def check_range(name: str, bounds: Range) -> None:
-    """Raise ValueError unless `bounds` is (low, high) with low <= high."""
-    low, high = bounds
-    if not low <= high:
-        raise ValueError(f"{name} is ({low:g}, {high:g}); expected low <= high")
-
-
-class SensorConfig(Section):
-    """The imager: optics, pixel, converter, timing. Every source is named in the YAML file."""
-
-    name: str = Field(description="name of the imager")
-    f1_hz: Positive = Field(24e6, description="first modulation frequency, Hz")
-    f2_hz: Positive = Field(10e6, description="second modulation frequency, Hz")
-    sample_period_s: Positive = Field(3.85e-3, description="time from one DCS to the next, s")
-    integration_s: Range = Field(
-        (5.5e-4, 7.5e-4), description="integration time drawn per drive, s"
-    )
-    harmonic_strength: Fraction = Field(
-        0.0, description="overtones of light and demodulation: 0 = sines, 1 = ideal squares"
-    )
-    highest_harmonic: int = Field(7, ge=1, le=31, description="highest odd harmonic rendered")
-    wavelength_nm: Positive = Field(940.0, description="laser wavelength, nm")
-    f_number: Positive = Field(1.2, description="lens f-number")
-    lens_transmission: Fraction = Field(0.8, description="lens and filter transmission")
-    pixel_pitch_m: Positive = Field(20e-6, description="pixel pitch, m")
-    fill_factor: Fraction = Field(1.0, description="light-sensitive share of a pixel")
-    quantum_efficiency: Fraction = Field(0.28, description="electrons per photon in band")
-    contrast: Fraction = Field(0.85, description="demodulation contrast m")
-    read_noise_e: NonNegative = Field(83.0, description="read noise of one tap, electrons rms")
-    full_well_e: Positive = Field(160e3, description="full well of one tap, electrons")
-    gain_lsb_per_e: Positive = Field(0.0128, description="converter gain, LSB per electron")
-    adc_bits: int = Field(12, ge=8, le=16, description="bits of the converter")
-    offset_std_lsb: NonNegative = Field(17.6, description="std of the tap offset pattern, LSB")
-    offset_row_share: Fraction = Field(0.5, description="share of offset variance common to a row")
-    offset_calibrated_share: Fraction = Field(
-        0.95, description="share of the pattern removed by the stored dark-offset map"
-    )
-    offset_ambient_lsb: NonNegative = Field(
-        8.0, description="row-parity offset that ambient adds at a full tap, LSB"
-    )
-    gray_max_exposure_s: Positive = Field(5e-3, description="longest gray exposure, s")
-    gray_target: Fraction = Field(0.3, description="mean of full scale aimed at by gray exposure")
-    min_snr: NonNegative = Field(1.0, description="signal-to-noise below which depth is invalid")
-    saturation_range_m: Positive = Field(
-        6.2, description="d_sat of eq. 6 and 8: wrapped distances from here on are not trusted, m"
-    )
-    max_range_m: Positive = Field(25.0, description="range that is unwrapped and scored, m")
-
-    @model_validator(mode="after")
-    def _consistent(self) -> SensorConfig:
-        check_range("integration_s", self.integration_s)
-        if self.f2_hz >= self.f1_hz:
-            raise ValueError(f"f2_hz is {self.f2_hz:g}; expected less than f1_hz = {self.f1_hz:g}")
-        if self.highest_harmonic % 2 == 0:
-            raise ValueError(f"highest_harmonic is {self.highest_harmonic}; expected an odd number")
-        if self.integration_s[0] <= 0 or self.integration_s[1] >= self.sample_period_s:
-            raise ValueError(
-                f"integration_s is {self.integration_s}; expected 0 < t < sample_period_s = "
-                f"{self.sample_period_s:g} s"
-            )
-        return self
 
 
 class LaserConfig(Section):

@@ -11,6 +11,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import torch
@@ -18,7 +19,7 @@ from torch import Tensor
 
 from unwrap.files import write_json
 from unwrap.frames import PhaseFrame
-from unwrap.phase import BELOW_TWO_PI, TWO_PI, decode
+from unwrap.phase import BELOW_TWO_PI, TWO_PI, decode, unambiguous_range_m
 
 BINS = 256
 LARGEST_FILE_BYTES = 2**20
@@ -47,21 +48,32 @@ class WiggleTable:
         """The table that removes `share` of what this one does."""
         return WiggleTable(tuple(share * error for error in self.error_rad))
 
+    @cached_property
+    def _lines(self) -> Tensor:
+        """One line a + b x per bin, [2, n + 1]; the last is for phases that round up to 2 pi."""
+        errors = torch.tensor((*self.error_rad, *self.error_rad[:2]), dtype=torch.float64)
+        slopes = errors.diff()
+        return torch.stack((errors[:-1] - slopes * torch.arange(len(slopes)), slopes))
+
     def error_of(self, phase_rad: Tensor) -> Tensor:
         """Phase error, of the shape of the decoded phases in [0, 2 pi)."""
-        bins = len(self.error_rad)
-        errors = phase_rad.new_tensor((*self.error_rad, self.error_rad[0]))
-        # One line per bin, a + b x. The entry after the last is for phases rounded up to 2 pi.
-        slopes = torch.cat((errors.diff(), errors[1:2] - errors[:1]))
-        starts = errors - slopes * torch.arange(bins + 1, dtype=phase_rad.dtype)
-        place = phase_rad * (bins / TWO_PI)
-        index = place.to(torch.int32).flatten()
-        line = starts.index_select(0, index), slopes.index_select(0, index)
-        return torch.addcmul(line[0], line[1], place.flatten()).view(phase_rad.shape)
+        place = (phase_rad * (len(self.error_rad) / TWO_PI)).flatten()
+        index = place.to(torch.int32)
+        start, slope = (part.index_select(0, index) for part in self._lines.to(place))
+        return torch.addcmul(start, slope, place).view(phase_rad.shape)
 
     def corrected(self, frame: PhaseFrame) -> PhaseFrame:
         """`frame` with the phase error removed."""
         return replace(frame, phase_rad=wrapped(frame.phase_rad - self.error_of(frame.phase_rad)))
+
+
+def shifted(frame: PhaseFrame, shift_m: Tensor, frequency_hz: float) -> PhaseFrame:
+    """`frame` [B, H, W] with `shift_m` [B] added to its distances, which wrap.
+
+    What a delay does to the samples of a sine, 4 pi f shift / c on the phase.
+    """
+    turn_rad = (shift_m * (TWO_PI / unambiguous_range_m(frequency_hz))).to(frame.phase_rad.dtype)
+    return replace(frame, phase_rad=wrapped(frame.phase_rad + turn_rad.view(-1, 1, 1)))
 
 
 def wrapped(phase_rad: Tensor) -> Tensor:
