@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import torch
 from torch import Tensor
@@ -310,7 +311,7 @@ def outcomes_of_all_actions(problem: Problem, drive: Drive) -> Outcomes:
 
 def _measure_all(problem: Problem, drive: Drive, step: Tensor) -> Measured:
     """All three acquisitions of one frame; they share the noise of the longest."""
-    noise = noise_of(drive, step, Shots.EIGHT, problem.bank.height, problem.bank.width)
+    noise = list(islice(noise_of(drive, step, problem.bank.height, problem.bank.width), Shots.EIGHT))
     return concatenate([measure(problem, drive, step, shots, noise) for shots in Shots])
 
 
