@@ -2,7 +2,6 @@
 
 from shotenv.sensor.acquire import Electrons, acquire, collect, expose, single_sample_snr
 from shotenv.sensor.drift import distance_drift_m, imager_temperature_k, residual_drift_m
-from shotenv.sensor.drift import distance_drift_m, imager_temperature_k, residual_drift_m
 from shotenv.sensor.electrons import electrons_per_radiance_second
 from shotenv.sensor.gray import capture_gray, sample_noise_lsb
 from shotenv.sensor.noise import Purpose, draw_noise, noise_samples, stream, stream_seed
@@ -16,13 +15,10 @@ __all__ = [
     "capture_gray",
     "collect",
     "distance_drift_m",
-    "distance_drift_m",
     "draw_noise",
     "draw_offsets",
     "electrons_per_radiance_second",
     "expose",
-    "imager_temperature_k",
-    "residual_drift_m",
     "imager_temperature_k",
     "noise_samples",
     "residual_drift_m",
