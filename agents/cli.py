@@ -15,6 +15,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from jsonargparse import ArgumentError, ArgumentParser, Namespace
+from jsonargparse.typing import PositiveInt
 
 from shotenv.config import (
     BankConfig,
@@ -114,6 +115,7 @@ def _plain(message: str) -> str:
         (r'Parser key "([^"]+)": ', r"\1: "),
         (r"\d+ validation errors? for [\w-]+ ", ""),
         (r"Input should be", "expected to be"),
+        (r"Not of type \w+: (\S+) does not conform to restriction v>0", r"\1; expected above 0"),
         (r"\[type=\w+, input_value=(.*?), input_type=\w+\]", r"(got \1)"),
     ):
         message = re.sub(pattern, kept, message)
@@ -166,10 +168,17 @@ def _demo(parser: ArgumentParser) -> None:
 def _render(parser: ArgumentParser) -> None:
     _config(parser, BankConfig, "bank/starter.yaml")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the bank")
-    parser.add_argument("--workers", type=int, metavar="N", help="processes; one per core")
+    parser.add_argument("--workers", type=PositiveInt, metavar="N", help="processes; one per core")
 
 
-def _bank(parser: ArgumentParser) -> None:
+def _bank_info(parser: ArgumentParser) -> None:
+    parser.add_argument("bank", nargs="?", help="name or path of a bank; all that are known")
+    parser.add_argument("--sheet", type=Path, metavar="FILE", help="write a contact sheet (PNG)")
+    parser.add_argument("--clips", type=PositiveInt, default=3, help="on the sheet, per family")
+    _json(parser)
+
+
+def _bank_verify(parser: ArgumentParser) -> None:
     parser.add_argument("bank", help="name or path of a bank")
     _json(parser)
 
@@ -185,7 +194,7 @@ def _unwrap_train(parser: ArgumentParser) -> None:
 def _unwrap_evaluate(parser: ArgumentParser) -> None:
     parser.add_argument("unwrapper", help="name or path of a network")
     parser.add_argument("--bank", default="starter", help="name or path of a bank")
-    parser.add_argument("--split", default="test", help="train, validation, test or all")
+    parser.add_argument("--split", default="test", help="train, validation, test, shift or all")
     _json(parser)
 
 
@@ -209,8 +218,8 @@ COMMANDS = (
     Command("doctor", "say what is installed, what is missing and what mends it", _doctor),
     Command("demo", "render, train a scheduler, compare it with baselines, write a report", _demo),
     Command("render", "render a bank of worlds; continues where it stopped", _render),
-    Command("bank info", "tell what is in a bank", _bank),
-    Command("bank verify", "check every file of a bank against its checksum", _bank),
+    Command("bank info", "list the banks, or tell and show what is in one", _bank_info),
+    Command("bank verify", "check every file of a bank against its checksum", _bank_verify),
     Command("unwrap train", "train an unwrapping network on a rendered bank", _unwrap_train),
     Command("unwrap evaluate", "measure an unwrapping network on a bank", _unwrap_evaluate),
     Command("train", "train a scheduler with PPO; continues where it stopped", _train),

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jsonargparse import Namespace
 
 from shotenv.config import BankConfig, DemoConfig
 from shotenv.progress import progress, say
-from unwrap.files import write_json
+from unwrap.files import write_bytes, write_json
+
+if TYPE_CHECKING:
+    from shotenv.bank import Bank
 
 DONE, FAILED = 0, 1
 
@@ -109,20 +113,31 @@ def render(arguments: Namespace) -> int:
 
 
 def bank_info(arguments: Namespace) -> int:
-    """Tell what is in a bank."""
+    """Tell what is in a bank, or which banks there are."""
+    from agents.banks import describe_bank, known_banks, print_bank, print_banks
     from shotenv.bank import open_bank
 
-    bank = open_bank(arguments.bank)
-    counts: dict[str, dict[str, int]] = {}
-    for clip in bank.clips:
-        families = counts.setdefault(clip.split, {})
-        families[clip.family] = families.get(clip.family, 0) + clip.frames
-    print(f"{bank.folder}: {len(bank)} frames of {bank.width} x {bank.height} pixels")
-    for split, families in counts.items():
-        print(f"  {split:12}" + ", ".join(f"{name} {n}" for name, n in families.items()))
-    about = {"folder": str(bank.folder), "frames": len(bank), "splits": counts}
-    _write_json(arguments, {**about, "fingerprint": bank.fingerprint})
+    if arguments.bank is None:
+        banks = known_banks()
+        print_banks(banks)
+        _write_json(arguments, banks)
+        return DONE
+    bank = open_bank(arguments.bank, render=False)
+    about = describe_bank(bank)
+    print_bank(about)
+    if arguments.sheet is not None:
+        _write_sheet(bank, arguments.sheet, arguments.clips)
+    _write_json(arguments, about)
     return DONE
+
+
+def _write_sheet(bank: Bank, path: Path, clips: int) -> None:
+    from agents.contact_sheet import contact_sheet
+
+    content = io.BytesIO()
+    contact_sheet(bank, clips=clips).save(content, format="PNG")
+    write_bytes(path, content.getvalue())
+    print(f"Contact sheet: {path.resolve()}")
 
 
 def bank_verify(arguments: Namespace) -> int:
@@ -130,13 +145,14 @@ def bank_verify(arguments: Namespace) -> int:
     from shotenv.bank import open_bank
     from shotenv.bank.store import verify
 
-    folder = open_bank(arguments.bank).folder
-    damaged = verify(folder)
-    for name in damaged:
-        say(f"shotenv: {folder / name} is damaged; delete {folder} and render it again")
+    bank = open_bank(arguments.bank, render=False)
+    with progress(len(bank.clips), "verifying", "clip") as bar:
+        damaged = verify(bank.folder, tick=bar.update)
+    for path in (bank.folder / name for name in damaged):
+        say(f"shotenv: {path} is damaged; delete {path.parent} and render the bank again")
     if not damaged:
-        print(f"{folder}: every file is as it was written")
-    _write_json(arguments, {"folder": str(folder), "damaged": list(damaged)})
+        print(f"{bank.folder}: every file is as it was written")
+    _write_json(arguments, {"folder": str(bank.folder), "damaged": list(damaged)})
     return FAILED if damaged else DONE
 
 

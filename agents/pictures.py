@@ -54,15 +54,20 @@ ERROR = ("#0b0b2a", "#4b1d6f", "#a02f6b", "#e4593f", "#fca50a", "#fcffa4")
 GRAY = ("#000000", "#ffffff")
 
 
-def picture(values: np.ndarray, colors: ColorMap) -> str:
-    """PNG data URI of `values` [H, W]; what is not finite is drawn in the no-value gray."""
+def paint(values: np.ndarray, colors: ColorMap) -> Image.Image:
+    """Palette image of `values` [H, W]; what is not finite is drawn in the no-value gray."""
     scaled = (values - colors.low) / (colors.high - colors.low) * (LEVELS - 1)
     known = np.isfinite(scaled)
     index = np.where(known, np.clip(np.where(known, scaled, 0.0), 0, LEVELS - 1).round(), LEVELS)
     image = Image.frombytes("P", values.shape[::-1], index.astype(np.uint8).tobytes())
     image.putpalette(colors.palette.tobytes())
+    return image
+
+
+def picture(values: np.ndarray, colors: ColorMap) -> str:
+    """`values` [H, W] painted, as a PNG data URI."""
     content = io.BytesIO()
-    image.save(content, format="PNG", optimize=True)
+    paint(values, colors).save(content, format="PNG", optimize=True)
     return "data:image/png;base64," + base64.b64encode(content.getvalue()).decode("ascii")
 
 

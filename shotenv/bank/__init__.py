@@ -15,14 +15,16 @@ from shotenv.config import BankConfig, ConfigError, find_config, read_config
 __all__ = ["Bank", "BankError", "BankFrame", "Clip", "open_bank"]
 
 
-def open_bank(bank: str | Path) -> Bank:
+def open_bank(bank: str | Path, *, render: bool = True) -> Bank:
     """Open a bank by name or path.
 
     Parameters
     ----------
     bank
         A folder that holds a bank, or a configuration: a name in `configs/bank/` or the path of
-        a YAML file. A configured bank is rendered first where it does not stand yet.
+        a YAML file.
+    render
+        Render a configured bank first where it does not stand yet; otherwise it is an error.
 
     Raises
     ------
@@ -35,6 +37,15 @@ def open_bank(bank: str | Path) -> Bank:
         path = find_config("bank", str(bank))
     except ConfigError as error:
         raise BankError(f"{error}, or of the folder of a bank") from None
-    from shotenv.bank.build import build_bank
+    from shotenv.bank.build import bank_folder, build_bank, clips_standing
 
-    return Bank(build_bank(read_config(BankConfig, path)))
+    config = read_config(BankConfig, path)
+    if render:
+        return Bank(build_bank(config))
+    standing, clips = clips_standing(config)
+    if not (bank_folder(config) / MANIFEST).is_file():
+        raise BankError(
+            f"bank {config.name} is not rendered yet ({standing} of {clips} clips stand); "
+            f"`shotenv render --config {path}` does it"
+        )
+    return Bank(bank_folder(config))

@@ -16,6 +16,7 @@ from filelock import FileLock
 
 from shotenv.bank.store import (
     ARRAYS,
+    CLIP_RECORD,
     MANIFEST,
     BankError,
     ClipRecord,
@@ -26,6 +27,9 @@ from shotenv.bank.store import (
 )
 from shotenv.config import BankConfig, Family, Split
 from shotenv.progress import progress, say
+from shotenv.render.llvm import require_llvm
+from shotenv.render.workers import available_cores, run_jobs
+from unwrap.acquisition import Shots
 from unwrap.files import write_json
 
 RENDERING_VERSION = 2
@@ -120,7 +124,7 @@ def build_bank(
         No usable LLVM library, or a worker died.
     """
     folder = bank_folder(config) if folder is None else Path(folder)
-    if (folder / MANIFEST).is_file() and _same_config(folder, config):
+    if _is_complete(folder, config):
         return folder
     _make_folder(folder)
     with FileLock(folder / ".lock"):
@@ -128,10 +132,16 @@ def build_bank(
         jobs = clip_jobs(config, folder)
         missing = [job for job in jobs if read_clip_record(job.folder) is None]
         _announce(config, folder, len(jobs), len(missing))
-        _render(missing, config, workers or len(os.sched_getaffinity(0)))
+        _render(missing, config, workers or available_cores())
         size = (config.camera.height, config.camera.width)
         write_manifest(folder, config.name, _records(jobs), size, config)
     return folder
+
+
+def _is_complete(folder: Path, config: BankConfig) -> bool:
+    if not ((folder / MANIFEST).is_file() and _same_config(folder, config)):
+        return False
+    return all((job.folder / CLIP_RECORD).is_file() for job in clip_jobs(config, folder))
 
 
 def _make_folder(folder: Path) -> None:
@@ -166,34 +176,48 @@ def _claim(folder: Path, config: BankConfig) -> None:
         raise BankError(f"{folder} holds a bank of another configuration; choose another folder")
     for leftover in (folder / "clips").glob(".*"):
         shutil.rmtree(leftover, ignore_errors=True)
+    for leftover in folder.glob(".*.json.*"):
+        leftover.unlink()
 
 
 def _announce(config: BankConfig, folder: Path, clips: int, missing: int) -> None:
-    camera, frames = config.camera, missing * config.world.frames_per_clip
-    needed = frames * frame_bytes(camera.height, camera.width)
-    free = shutil.disk_usage(folder).free
+    frames = missing * config.world.frames_per_clip
+    needed, free = bank_bytes(config, frames), shutil.disk_usage(folder).free
     if needed * 1.05 > free:
         raise BankError(
             f"{folder} needs {needed / 1e9:.2f} GB but the disk has {free / 1e9:.2f} GB "
             "free; free space or choose another cache folder with SHOTENV_CACHE"
         )
-    rays = frames * camera.height * camera.width * camera.samples_per_pixel
-    rays *= 8 + camera.gray_instants
-    cores = len(os.sched_getaffinity(0))
-    minutes = rays / 1e6 * SECONDS_PER_MILLION_RAYS * camera.bounces / 2 / cores / 60
     say(
         f"Rendering bank '{config.name}' into {folder}: {missing} of {clips} clips, "
-        f"{frames} frames, {needed / 1e6:.0f} MB, about {max(minutes, 0.1):.1f} minutes on "
-        f"{cores} cores. It can be interrupted; the next start continues.",
+        f"{frames} frames, {needed / 1e6:.0f} MB, about {rendering_minutes(config, frames):.1f} "
+        f"minutes on {available_cores()} cores. It can be interrupted; the next start continues.",
     )
+
+
+def bank_bytes(config: BankConfig, frames: int) -> int:
+    """Bytes on disk of `frames` frames."""
+    return frames * frame_bytes(config.camera.height, config.camera.width)
+
+
+def rendering_minutes(config: BankConfig, frames: int) -> float:
+    """Estimated time to render `frames` frames on all cores, minutes."""
+    camera = config.camera
+    rays = frames * camera.height * camera.width * camera.samples_per_pixel
+    rays *= int(Shots.EIGHT) + camera.gray_instants
+    seconds = rays / 1e6 * SECONDS_PER_MILLION_RAYS * camera.bounces / 2 / available_cores()
+    return max(seconds / 60, 0.1)
+
+
+def clips_standing(config: BankConfig) -> tuple[int, int]:
+    """Clips of the bank that stand in the cache folder, and all that it will have."""
+    jobs = clip_jobs(config, bank_folder(config))
+    return sum((job.folder / CLIP_RECORD).is_file() for job in jobs), len(jobs)
 
 
 def _render(jobs: Sequence[ClipJob], config: BankConfig, workers: int) -> None:
     if not jobs:
         return
-    from shotenv.render.llvm import require_llvm
-    from shotenv.render.workers import run_jobs
-
     require_llvm()
     frames = config.world.frames_per_clip
     with progress(len(jobs) * frames, "rendering", "frame") as bar:

@@ -14,7 +14,7 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -26,7 +26,7 @@ from shotenv.config import BankConfig, Split, one_sentence
 from unwrap.files import write_json
 
 SCHEMA_VERSION: Final = 1
-MANIFEST = "manifest.json"
+MANIFEST, CLIP_RECORD = "manifest.json", "clip.json"
 LARGEST_JSON_BYTES = 64 * 2**20
 
 
@@ -137,9 +137,8 @@ def write_clip(
         temporary.mkdir(parents=True)
         hashes = {name: _write_array(temporary, name, arrays[name]) for name in ARRAYS}
         record = ClipRecord(**metadata, frames=frames, folder=f"clips/{folder.name}", sha256=hashes)
-        write_json(temporary / "clip.json", {**record.model_dump(), "shape": [height, width]})
-        temporary.rename(folder)
-        _flush_folder(folder.parent)
+        write_json(temporary / CLIP_RECORD, {**record.model_dump(), "shape": [height, width]})
+        _publish(temporary, folder)
     except OSError as error:
         shutil.rmtree(temporary, ignore_errors=True)
         raise BankError(
@@ -147,6 +146,17 @@ def write_clip(
             "cache folder with SHOTENV_CACHE"
         ) from None
     return record
+
+
+def _publish(temporary: Path, folder: Path) -> None:
+    try:
+        temporary.rename(folder)
+    except OSError:
+        # A worker that outlived its killed parent for a moment may have written the same clip.
+        if not (folder / CLIP_RECORD).is_file():
+            raise
+        shutil.rmtree(temporary)
+    _flush_folder(folder.parent)
 
 
 def _checked_shape(arrays: Mapping[str, np.ndarray]) -> tuple[int, int, int]:
@@ -208,7 +218,7 @@ def write_manifest(
 
 def read_clip_record(folder: Path) -> ClipRecord | None:
     """Record of a finished clip, or None where there is none."""
-    path = folder / "clip.json"
+    path = folder / CLIP_RECORD
     if not path.is_file():
         return None
     content = _load_json(path)
@@ -257,7 +267,7 @@ def _validated(model, content: dict, path: Path):
 
 
 def _cure(path: Path) -> str:
-    return f"delete {path.parent} and render it again"
+    return f"delete {path if path.name == MANIFEST else path.parent} and render the bank again"
 
 
 def _check_header(path: Path, clip: ClipRecord, spec: ArraySpec, manifest: Manifest) -> None:
@@ -280,18 +290,35 @@ def _check_header(path: Path, clip: ClipRecord, spec: ArraySpec, manifest: Manif
         )
 
 
-def verify(folder: Path) -> tuple[str, ...]:
-    """Names of the array files whose content differs from the manifest's sha256; empty is good.
+def verify(folder: Path, *, tick: Callable[[], object] = lambda: None) -> tuple[str, ...]:
+    """Names of the files that are not as they were written; empty is good.
+
+    Arrays are compared with the manifest's sha256, the clips' own records with the manifest.
+
+    Parameters
+    ----------
+    tick : callable
+        Called after each clip.
 
     Raises
     ------
     BankError
         The manifest or an array's header is damaged.
     """
-    manifest = read_manifest(folder)
-    return tuple(
-        f"{clip.folder}/{name}.npy"
-        for clip in manifest.clips
-        for name, digest in clip.sha256.items()
-        if sha256_of(folder / clip.folder / f"{name}.npy") != digest
-    )
+    damaged: list[str] = []
+    for clip in read_manifest(folder).clips:
+        damaged += [f"{clip.folder}/{name}" for name in _damaged_files(folder / clip.folder, clip)]
+        tick()
+    return tuple(damaged)
+
+
+def _damaged_files(folder: Path, clip: ClipRecord) -> Iterator[str]:
+    for name, digest in clip.sha256.items():
+        if sha256_of(folder / f"{name}.npy") != digest:
+            yield f"{name}.npy"
+    try:
+        same = read_clip_record(folder) == clip
+    except BankError:
+        same = False
+    if not same:
+        yield CLIP_RECORD
