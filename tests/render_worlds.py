@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
 
 import numpy as np
 
 from shotenv.config import CameraConfig
 from shotenv.render import Instants
+from shotenv.world.meshes import join
 from shotenv.world.model import Light, Mesh, Motion, MovingObject, Pose, World
 
 DARK = Light(0.0, (0.0, 0.0, 1.0), 0.0, 0.0, ())
@@ -46,8 +46,7 @@ def mesh(
 
 def joined(*meshes: Mesh) -> Mesh:
     """Several meshes as one."""
-    names = [field.name for field in fields(Mesh)]
-    return Mesh(*(np.concatenate([getattr(part, name) for part in meshes]) for name in names))
+    return join(meshes)
 
 
 def world(
@@ -64,10 +63,20 @@ def world(
     return World("garage", 0, static, moving, light, ego)
 
 
-def at(*times_s: float) -> Instants:
+def at(*times_s: float, frequency_hz: float = 0.0, theta_rad: float = 0.0) -> Instants:
     """Instants at which everything is rendered, with the same random numbers."""
-    everywhere = (True,) * len(times_s)
-    return Instants(times_s, everywhere, everywhere, (0,) * len(times_s))
+    everywhere, count = (True,) * len(times_s), len(times_s)
+    hz, theta = (frequency_hz,) * count, (theta_rad,) * count
+    return Instants(times_s, everywhere, everywhere, (0,) * count, hz, theta)
+
+
+def phasor(trace, scene: World, camera: CameraConfig, frequency_hz: float, seed=0) -> np.ndarray:
+    """Sum over light paths of radiance times exp(i 2 pi f L / c), complex [H, W]."""
+    in_phase, in_quadrature = (
+        trace(scene, at(0.0, frequency_hz=frequency_hz, theta_rad=theta), camera, seed=seed)
+        for theta in (0.0, math.pi / 2)
+    )
+    return in_phase.correlation[0] + 1j * in_quadrature.correlation[0]
 
 
 def ray_directions(camera: CameraConfig) -> np.ndarray:

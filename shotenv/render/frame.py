@@ -10,7 +10,7 @@ import numpy as np
 from shotenv.config import CameraConfig, SensorConfig
 from shotenv.render.instants import frame_instants
 from shotenv.render.llvm import start_mitsuba
-from unwrap.acquisition import Shots, demodulation_phase_rad, frequency_index
+from unwrap.acquisition import harmonic_weights
 
 if TYPE_CHECKING:  # Worker processes start without loading how worlds are drawn.
     from shotenv.world.model import World
@@ -23,7 +23,8 @@ class RenderedFrame:
     Attributes
     ----------
     correlation : float32 [8, H, W]
-        Re(P_f exp(-i theta_k)) of each sample at its own instant, W m-2 sr-1 per watt of laser.
+        Active light times the demodulation signal, of each sample at its own instant,
+        W m-2 sr-1 per watt of laser: `Traced.correlation`.
     active : float32 [H, W]
         Active radiance, mean over the samples, W m-2 sr-1 per watt of laser.
     ambient : float32 [H, W]
@@ -52,20 +53,12 @@ def render_frame(
     from shotenv.render.integrator import trace
 
     instants = frame_instants(time_s, camera, sensor)
-    traced = trace(world, instants, camera, (sensor.f1_hz, sensor.f2_hz), seed=seed)
+    weights = harmonic_weights(sensor.harmonic_strength, sensor.highest_harmonic)
+    traced = trace(world, instants, camera, harmonics=weights, seed=seed)
     laser, passive = np.array(instants.laser), np.array(instants.passive)
     return RenderedFrame(
-        correlation=correlate(traced.phasor[:, laser]),
+        correlation=traced.correlation[laser],
         active=traced.active[laser].mean(axis=0),
         ambient=traced.ambient[passive].mean(axis=0),
         distance_m=traced.distance_m[0],
     )
-
-
-def correlate(phasor: np.ndarray) -> np.ndarray:
-    """Correlation [8, H, W] of the phasors [2, 8, H, W]: each sample's own frequency and phase."""
-    samples = range(int(Shots.EIGHT))
-    turned = [
-        phasor[frequency_index(k), k] * np.exp(-1j * demodulation_phase_rad(k)) for k in samples
-    ]
-    return np.real(np.stack(turned)).astype(np.float32)

@@ -102,7 +102,8 @@ def _padding(world: World) -> list[Mesh]:
     zero = np.zeros(1, np.float32)
     buried = np.asarray(world.ego.start.position_m) - (0.0, 0.0, 10.0)
     corners = np.broadcast_to(buried.astype(np.float32), (1, 3, 3))
-    return [Mesh(corners, np.zeros((1, 3, 2), np.float32), *[zero] * 6)]
+    uv = np.zeros((1, 3, 2), np.float32)
+    return [Mesh(corners, uv, zero, zero, zero, zero, zero, zero)]
 
 
 def _normals(corners: np.ndarray) -> np.ndarray:

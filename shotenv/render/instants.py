@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from shotenv.config import CameraConfig, SensorConfig
-from unwrap.acquisition import Shots, sample_times_s
+from unwrap.acquisition import Shots, demodulation_phase_rad, frequency_index, sample_times_s
 
 
 @dataclass(frozen=True)
@@ -21,12 +21,16 @@ class Instants:
     draw : tuple of int, T
         Instants with the same number share their random numbers, so that they differ by what
         moved and not by Monte Carlo noise. Counted from 0.
+    frequency_hz, theta_rad : tuple of float, T
+        Modulation frequency of the laser and phase of the demodulation signal.
     """
 
     times_s: tuple[float, ...]
     laser: tuple[bool, ...]
     passive: tuple[bool, ...]
     draw: tuple[int, ...]
+    frequency_hz: tuple[float, ...]
+    theta_rad: tuple[float, ...]
 
     def __len__(self) -> int:
         return len(self.times_s)
@@ -39,12 +43,18 @@ def frame_instants(time_s: float, camera: CameraConfig, sensor: SensorConfig) ->
     equal parts of the longest gray exposure, which ends where the first sample starts.
     """
     samples = [time_s + t for t in sample_times_s(Shots.EIGHT, sensor.sample_period_s)]
+    frequencies_hz = (sensor.f1_hz, sensor.f2_hz)
+    sample_hz = [frequencies_hz[frequency_index(k)] for k in range(len(samples))]
+    theta_rad = [demodulation_phase_rad(k) for k in range(len(samples))]
     gray_count = camera.gray_instants
     gray = [time_s - sensor.gray_max_exposure_s * (i + 0.5) / gray_count for i in range(gray_count)]
     laser = (True,) * len(samples) + (False,) * gray_count
+    unmodulated = (0.0,) * gray_count
     return Instants(
         times_s=(*samples, *gray),
         laser=laser,
         passive=tuple(not on for on in laser),
         draw=(0,) * len(samples) + tuple(range(gray_count)),
+        frequency_hz=(*sample_hz, *unmodulated),
+        theta_rad=(*theta_rad, *unmodulated),
     )

@@ -1,8 +1,13 @@
-"""One launch: distance, ambient, active light and its phasors for every pixel of every instant."""
+"""One launch: distance, ambient, active light and its correlation, of every pixel and instant.
+
+Light paths start at the camera. At a surface they go on diffusely, mirrored, or straight through,
+by chance in proportion to the surface's shares; sun, sky and lamps are added at each surface, and
+so is the laser: by the way that the camera looks, back through all mirrors and panes, and directly.
+What a mirror throws on a surface that is seen directly (a caustic) is left out.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,63 +19,66 @@ from shotenv.config import CameraConfig
 from shotenv.render.geometry import REACH_M, geometry_at
 from shotenv.render.instants import Instants
 from shotenv.render.light import PassiveLight
+from shotenv.render.modulation import FUNDAMENTAL, Harmonics, Modulation
 from shotenv.render.pinhole import Pinhole
 from shotenv.render.sampling import Lanes, Sampler
 from shotenv.render.scene import SURFACE_OFFSET_M, Hit, Scene
 from shotenv.world.model import World
 
-SPEED_OF_LIGHT_M_S = 299_792_458.0
 _RETRO_COS = 0.5
 
 
 @dataclass(frozen=True)
 class Traced:
-    """Light of T instants of one world, F modulation frequencies.
+    """Light of T instants of one world.
 
     Attributes
     ----------
     distance_m : float32 [T, H, W]
-        Radial distance through the pixel's centre, metres; infinite where nothing is hit.
+        Radial distance to the first surface through the pixel's centre, metres; infinite where
+        nothing is hit.
     ambient : float32 [T, H, W]
         Passive radiance, W m-2 sr-1; 0 at instants without passive light.
     active : float32 [T, H, W]
         Radiance of the laser's light, W m-2 sr-1 per watt; 0 at instants without laser.
-    phasor : complex64 [F, T, H, W]
-        Sum over light paths of radiance times exp(i 2 pi f L / c), L the path length from laser
-        to camera: its phase for a single bounce at distance d is 4 pi f d / c.
+    correlation : float32 [T, H, W]
+        Sum over light paths of radiance times sum over harmonics h of
+        w_h cos(h (2 pi f L / c - theta)), L the path length from laser to camera: a single bounce
+        at distance d has the phase 4 pi f d / c.
     """
 
     distance_m: np.ndarray
     ambient: np.ndarray
     active: np.ndarray
-    phasor: np.ndarray
+    correlation: np.ndarray
 
 
 def trace(
     world: World,
     instants: Instants,
     camera: CameraConfig,
-    frequencies_hz: Sequence[float],
     *,
+    harmonics: Harmonics = FUNDAMENTAL,
     seed: int,
 ) -> Traced:
     """Trace `camera.samples_per_pixel` paths per pixel and instant, in one kernel launch.
 
-    The laser sits at the camera and shines evenly over the field of view. The result depends on
-    the arguments alone, bit for bit on one machine.
+    The laser sits at the camera and shines evenly over the field of view. `harmonics` are those
+    of the correlation, see `unwrap.acquisition.harmonic_weights`. The result depends on the
+    arguments alone, bit for bit on one machine.
     """
     lanes = Lanes.of(len(instants), camera)
     eye = Pinhole(world.ego, instants, camera)
     lights = _Lights(
         eye,
         PassiveLight(world, instants),
+        Modulation(instants, harmonics, lanes.instant),
         dr.gather(mi.Bool, mi.Bool(list(instants.laser)), lanes.instant),
         dr.gather(mi.Bool, mi.Bool(list(instants.passive)), lanes.instant),
     )
     scene = Scene(geometry_at(world, instants.times_s, camera.bounces))
-    light = _follow(
-        scene, lights, lanes, camera, frequencies_hz, Sampler(lanes, instants, camera, seed=seed)
-    )
+    sampler = Sampler(lanes, instants, camera, seed=seed)
+    light = _follow(scene, lights, lanes, camera.bounces, sampler)
     return _collect(light, lanes, len(instants), camera)
 
 
@@ -80,6 +88,7 @@ class _Lights:
 
     eye: Pinhole
     passive: PassiveLight
+    modulation: Modulation
     laser_on: Any
     passive_on: Any
 
@@ -88,92 +97,142 @@ class _Lights:
 class _Light:
     """What the lanes have gathered so far."""
 
+    modulation: Modulation
     distance_m: Any
     ambient: Any
     active: Any
-    phasor: list[Any]
+    correlation: Any
 
-    def add_active(self, radiance, path_m, frequencies_hz: Sequence[float]) -> None:
+    def add_active(self, radiance, path_m) -> None:
         """Add laser light that came a way of `path_m` metres."""
         self.active += radiance
-        for index, frequency_hz in enumerate(frequencies_hz):
-            sine, cosine = dr.sincos(path_m * (dr.two_pi * frequency_hz / SPEED_OF_LIGHT_M_S))
-            self.phasor[index] += mi.Vector2f(radiance * cosine, radiance * sine)
+        self.correlation += radiance * self.modulation.at(path_m)
 
 
-def _follow(
-    scene: Scene,
-    lights: _Lights,
-    lanes: Lanes,
-    camera: CameraConfig,
-    frequencies_hz: Sequence[float],
-    sampler: Sampler,
-) -> _Light:
+@dataclass(frozen=True)
+class _Onward:
+    """How a light path goes on from a surface, and what it keeps of its light."""
+
+    start: Any
+    direction: Any
+    kept: Any
+    scatters: Any
+    passes: Any
+    number: Any
+    """The random number that chose, stretched back to [0, 1)."""
+
+    @classmethod
+    def drawn(cls, hit: Hit, direction, number, sample) -> _Onward:
+        """Choose among the shares of the surface by `number`, a diffuse direction by `sample`."""
+        mirrors = number < hit.mirror
+        passes = ~mirrors & (number < hit.mirror + hit.clear)
+        scatters = ~mirrors & ~passes
+        scattered = mi.Frame3f(hit.normal).to_world(mi.warp.square_to_cosine_hemisphere(sample))
+        mirrored = direction - 2 * dr.dot(direction, hit.normal) * hit.normal
+        below = dr.select(mirrors, 0, dr.select(passes, hit.mirror, hit.mirror + hit.clear))
+        share = dr.select(mirrors, hit.mirror, dr.select(passes, hit.clear, hit.diffuse))
+        return cls(
+            start=dr.select(passes, dr.fma(direction, SURFACE_OFFSET_M, hit.point), hit.leave),
+            direction=dr.select(passes, direction, dr.select(mirrors, mirrored, scattered)),
+            kept=dr.select(scatters, hit.albedo, 1),
+            scatters=scatters,
+            passes=passes,
+            number=(number - below) / share,
+        )
+
+
+def _follow(scene: Scene, lights: _Lights, lanes: Lanes, bounces: int, sampler: Sampler) -> _Light:
     """Walk every lane's path from the camera, adding the light of each surface hit."""
-    eye, passive, instant = lights.eye, lights.passive, lanes.instant
-    origin, direction = eye.rays(lanes, sampler.next_2d())
+    passive, instant = lights.passive, lanes.instant
+    origin, direction = lights.eye.rays(lanes, sampler.next_2d())
     hit = scene.hit(origin, direction, instant, mi.Bool(True), coherent=True)
-    seen = dr.select(hit.valid, hit.emission, passive.sky(direction))
     light = _Light(
+        modulation=lights.modulation,
         distance_m=dr.select(hit.valid, hit.distance_m, dr.inf),
-        ambient=dr.select(lights.passive_on, seen, 0),
+        ambient=dr.select(lights.passive_on & ~hit.valid, passive.sky(direction), 0),
         active=mi.Float(0),
-        phasor=[mi.Vector2f(0) for _ in frequencies_hz],
+        correlation=mi.Float(0),
     )
     throughput, walked_m = mi.Float(1), hit.distance_m
-    for bounce in range(camera.bounces):
-        laser = _laser(scene, eye, hit, instant, hit.valid & lights.laser_on, bounce == 0)
-        light.add_active(throughput * laser[0], walked_m + laser[1], frequencies_hz)
-        throughput *= hit.albedo
-        passive_on = hit.valid & lights.passive_on
+    # Share of the laser's light on the way that the camera looks; 0 once that way has scattered.
+    way_back, bent, seeks_sky = mi.Float(1), mi.Bool(False), lights.passive_on
+    for bounce in range(bounces):
+        laser_on, passive_on = hit.valid & lights.laser_on, hit.valid & lights.passive_on
+        returned = _laser_returned(lights.eye, hit, direction, walked_m)
+        returned = dr.select(laser_on, throughput * way_back * returned, 0)
+        light.add_active(returned, 2 * walked_m)
+        if bounce > 0:
+            radiance, leg_m = _laser(scene, lights.eye, hit, instant, laser_on & bent)
+            light.add_active(throughput * radiance, walked_m + leg_m)
+        glow = dr.select(passive_on & (way_back > 0), hit.emission, 0)
+        light.ambient += throughput * glow
+
         irradiance = passive.daylight(scene, hit, instant, sampler, passive_on)
-        irradiance += passive.lamps(scene, hit, instant, sampler.next_1d(), passive_on)
-        onward = mi.Frame3f(hit.normal).to_world(
-            mi.warp.square_to_cosine_hemisphere(sampler.next_2d())
+        number, sample = sampler.next_1d(), sampler.next_2d()
+        onward = _Onward.drawn(hit, direction, number, sample)
+        irradiance += passive.lamps(scene, hit, instant, onward.number, passive_on)
+        # Per what is kept: the surface reflects to the camera whatever way the path goes on.
+        irradiance *= hit.diffuse * dr.select(onward.scatters, 1, hit.albedo)
+        throughput *= onward.kept
+        seeks_sky = passive_on & dr.select(
+            onward.scatters, ~passive.sky_is_aimed_at(hit), seeks_sky | ~onward.passes
         )
-        seeks_sky = passive_on & ~passive.sky_is_aimed_at(hit)
-        if bounce + 1 < camera.bounces:
-            previous, hit = hit, scene.hit(hit.leave, onward, instant, hit.valid)
+        direction = onward.direction
+        if bounce + 1 < bounces:
+            bent |= ~onward.passes
+            way_back *= dr.select(
+                onward.scatters, 0, dr.select(onward.passes, hit.clear, hit.mirror)
+            )
+            previous, hit = hit, scene.hit(onward.start, direction, instant, hit.valid)
             walked_m += dr.norm(hit.point - previous.point)
-            free = seeks_sky & ~hit.valid
+            free = dr.select(seeks_sky & ~hit.valid, 1, 0)
         else:
-            free = scene.visible(hit.leave, onward, mi.Float(REACH_M), instant, seeks_sky)
-        sky = dr.select(free, passive.sky(onward), 0)
-        light.ambient += throughput * dr.fma(irradiance, dr.inv_pi, sky)
+            reach = mi.Float(REACH_M)
+            free = scene.transmission(onward.start, direction, reach, instant, seeks_sky)
+        light.ambient += throughput * dr.fma(irradiance, dr.inv_pi, passive.sky(direction) * free)
     return light
 
 
-def _laser(scene: Scene, eye: Pinhole, hit: Hit, instant, active, first: bool):
-    """Radiance per watt that a surface reflects of the laser's light, and its distance to it.
+def _laser_returned(eye: Pinhole, hit: Hit, direction, distance_m):
+    """Radiance per watt of the laser's light that came the way that the camera looks.
 
-    The laser is at the camera: the first hit sees it without a shadow ray, and retro-reflects.
+    Mirrors fold that way and panes dim it, but nothing else can stand on it. Surfaces that it
+    meets steeply enough retro-reflect.
     """
+    cosine = -dr.dot(hit.normal, direction)
+    retro = dr.select(cosine > _RETRO_COS, hit.retro, 0)
+    return _reflected(hit, eye.intensity, cosine, distance_m) * (1 + retro)
+
+
+def _laser(scene: Scene, eye: Pinhole, hit: Hit, instant, active):
+    """Radiance per watt of the laser's light that came straight, and its distance."""
     intensity, direction, distance = eye.laser(hit.point, instant)
-    cos_surface = dr.maximum(dr.dot(hit.normal, direction), 0)
-    radiance = hit.albedo * dr.inv_pi * intensity * cos_surface / dr.square(distance)
+    cosine = dr.maximum(dr.dot(hit.normal, direction), 0)
+    radiance = _reflected(hit, intensity, cosine, distance)
     lit = active & (radiance > 0)
-    if first:
-        radiance *= 1 + dr.select(cos_surface > _RETRO_COS, hit.retro, 0)
-    else:
-        lit &= scene.visible(hit.leave, direction, distance - SURFACE_OFFSET_M, instant, lit)
-    return dr.select(lit, radiance, 0), dr.minimum(distance, REACH_M)
+    length = distance - SURFACE_OFFSET_M
+    share = scene.transmission(hit.leave, direction, length, instant, lit)
+    return dr.select(lit, radiance * share, 0), dr.minimum(distance, REACH_M)
+
+
+def _reflected(hit: Hit, intensity, cosine, distance_m):
+    """Radiance that a surface reflects diffusely of a point source."""
+    return hit.diffuse * hit.albedo * dr.inv_pi * intensity * cosine / dr.square(distance_m)
 
 
 def _collect(light: _Light, lanes: Lanes, instants: int, camera: CameraConfig) -> Traced:
     """Mean over the samples of each pixel; distances are those of sample 0."""
-    samples, frequencies = camera.samples_per_pixel, len(light.phasor)
-    flat = [part for phasor in light.phasor for part in phasor]
-    dr.eval(light.distance_m, light.ambient, light.active, flat)
+    samples = camera.samples_per_pixel
+    dr.eval(light.distance_m, light.ambient, light.active, light.correlation)
     centre = dr.arange(mi.UInt32, instants * camera.width * camera.height) * samples
     shape = (instants, camera.height, camera.width)
 
     def mean(values) -> np.ndarray:
         return (dr.block_sum(values, samples) / samples).numpy().reshape(shape)
 
-    parts = np.stack([mean(part) for part in flat]) if flat else np.empty((0, *shape))
     return Traced(
         distance_m=dr.gather(mi.Float, light.distance_m, centre).numpy().reshape(shape),
         ambient=mean(light.ambient),
         active=mean(light.active),
-        phasor=(parts[0::2] + 1j * parts[1::2]).astype(np.complex64).reshape(frequencies, *shape),
+        correlation=mean(light.correlation),
     )

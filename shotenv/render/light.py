@@ -81,8 +81,8 @@ class PassiveLight:
         sun = dr.select(self._opening.lets_in(hit.point, self._sun_direction), sun, 0)
         choice = choice.offer(sun, self._sun_direction, mi.Float(REACH_M))
         lit = active & (choice.total > 0)
-        seen = scene.visible(hit.leave, choice.direction, choice.length, instant, lit)
-        return dr.select(seen, choice.total, 0)
+        share = scene.transmission(hit.leave, choice.direction, choice.length, instant, lit)
+        return choice.total * share
 
     def sky_is_aimed_at(self, hit: Hit):
         """Whether `daylight` holds the sky's light on this surface already."""
@@ -104,8 +104,8 @@ class PassiveLight:
         """
         choice = self._choose_lamp(hit, instant, number, active)
         lit = active & (choice.total > 0)
-        seen = scene.visible(hit.leave, choice.direction, choice.length, instant, lit)
-        return dr.select(seen, choice.total, 0)
+        share = scene.transmission(hit.leave, choice.direction, choice.length, instant, lit)
+        return choice.total * share
 
     def _choose_lamp(self, hit: Hit, instant, number, active) -> _Choice:
         def more(index, *_):

@@ -32,11 +32,13 @@ class Pinhole:
     """Camera poses of all instants on the device, with the laser at the same place.
 
     Rays start at the centre of projection itself, so that distances are true distances.
+    `intensity` is the laser's inside the field of view, W sr-1 per watt.
     """
 
     def __init__(self, ego: Motion, instants: Instants, camera: CameraConfig):
         poses = [ego.at(t) for t in instants.times_s]
         self._camera = camera
+        self.intensity = 1 / field_of_view_sr(camera)
         self._position = upload(np.array([pose.position_m for pose in poses]))
         self._axes = upload(np.stack([rotation(pose).T for pose in poses]))
 
@@ -61,12 +63,10 @@ class Pinhole:
         ahead, leftward, upward = self._axes_at(instant)
         across, down = half_extents(self._camera)
         depth = -dr.dot(direction, ahead)
-        # A lane's own ray may leave the outermost pixel's edge by a rounding error.
-        limit = depth * (1 + 1e-5)
-        inside = (dr.abs(dr.dot(direction, leftward)) <= across * limit) & (
-            dr.abs(dr.dot(direction, upward)) <= down * limit
+        inside = (dr.abs(dr.dot(direction, leftward)) <= across * depth) & (
+            dr.abs(dr.dot(direction, upward)) <= down * depth
         )
-        return dr.select(inside, 1 / field_of_view_sr(self._camera), 0), direction, distance
+        return dr.select(inside, self.intensity, 0), direction, distance
 
     def _position_at(self, instant):
         return dr.gather(mi.Point3f, self._position, instant)

@@ -21,7 +21,8 @@ SURFACE_OFFSET_M = 1e-3
 class Hit:
     """Where rays meet a surface; wavefront values, finite but meaningless where not `valid`.
 
-    `normal` faces the ray, `leave` is `point` lifted off the surface along it.
+    `normal` faces the ray, `leave` is `point` lifted off the surface along it. Of the light,
+    `mirror` is mirrored, `clear` passes straight through, `diffuse` is the rest.
     """
 
     valid: Any
@@ -32,6 +33,20 @@ class Hit:
     albedo: Any
     retro: Any
     emission: Any
+    mirror: Any
+    clear: Any
+    diffuse: Any
+
+
+@dataclass(frozen=True)
+class _Near:
+    """The nearest triangle on each ray: its face at that instant's pose, and in the tables."""
+
+    valid: Any
+    distance_m: Any
+    posed_face: Any
+    face: Any
+    corner_weight: Any
 
 
 class Scene:
@@ -51,28 +66,23 @@ class Scene:
         self._noise = mi.Texture2f(
             mi.TensorXf(noise_texture()[..., None]), wrap_mode=dr.WrapMode.Repeat
         )
+        self._has_panes = dr.opaque(mi.Bool, bool(geometry.uv[:, 7].any()))
         self._static_faces = dr.opaque(mi.UInt32, len(geometry.static))
         self._moving_faces = dr.opaque(mi.UInt32, len(geometry.moving) // len(geometry.tile_m))
 
     def hit(self, origin, direction, instant, active, coherent: bool = False) -> Hit:
         """Nearest surface along each ray, within `REACH_M`; neighbouring rays may be alike."""
-        tile = dr.gather(mi.Vector3f, self._tile, instant, active)
-        ray = _ray(origin, direction, mi.Float(REACH_M))
-        still = self._static.ray_intersect_preliminary(ray, coherent, active)
-        ray = _ray(origin + tile, direction, dr.minimum(still.t, REACH_M))
-        moved = self._moving.ray_intersect_preliminary(ray, coherent, active)
-        moves = moved.t < still.t
-        nearest = dr.minimum(still.t, moved.t)
-        valid = active & (nearest < REACH_M)
-        distance = dr.select(valid, nearest, 0)
-        first = dr.select(moves, self._static_faces, 0)
-        posed_face = dr.select(moves, moved.prim_index, still.prim_index) + first
-        face = posed_face - dr.select(moves, instant * self._moving_faces, 0)
-        corner_weight = dr.select(moves, moved.prim_uv, still.prim_uv)
-        normal = dr.gather(mi.Vector4f, self._normals, posed_face, valid).xyz
+        near = self._nearest(origin, direction, mi.Float(REACH_M), instant, active, coherent)
+        valid, face = near.valid, near.face
+        distance = dr.select(valid, near.distance_m, 0)
+        normal = dr.gather(mi.Vector4f, self._normals, near.posed_face, valid).xyz
         normal = dr.select(dr.dot(normal, direction) > 0, -normal, normal)
         low, high, retro, emission = dr.gather(mi.Vector4f, self._surface, face, valid)
-        noise = self._noise_at(face, corner_weight, valid)
+        first, rest = (dr.gather(mi.Vector4f, self._uv, 2 * face + i, valid) for i in range(2))
+        along, across = near.corner_weight
+        u = first[0] + along * first[2] + across * rest[0]
+        v = first[1] + along * first[3] + across * rest[1]
+        noise = self._noise.eval(mi.Point2f(u, v), valid)[0]
         point = dr.fma(direction, distance, origin)
         return Hit(
             valid=valid,
@@ -83,23 +93,57 @@ class Scene:
             albedo=dr.select(valid, dr.fma(high - low, noise, low), 0),
             retro=retro,
             emission=emission,
+            mirror=rest[2],
+            clear=rest[3],
+            diffuse=1 - rest[2] - rest[3],
         )
 
-    def visible(self, origin, direction, length, instant, active):
-        """Whether nothing stands on each ray within `length` (at most `REACH_M`)."""
+    def transmission(self, origin, direction, length, instant, active):
+        """Share of the light that comes through `length` metres of each ray (at most `REACH_M`).
+
+        1 where nothing stands on the ray, 0 where something opaque does; panes let their clear
+        share through.
+        """
         tile = dr.gather(mi.Vector3f, self._tile, instant, active)
         length = dr.minimum(length, REACH_M)
         blocked = self._static.ray_test(_ray(origin, direction, length), False, active)
         free = active & ~blocked
-        return free & ~self._moving.ray_test(_ray(origin + tile, direction, length), False, free)
+        free &= ~self._moving.ray_test(_ray(origin + tile, direction, length), False, free)
+        behind = active & ~free & self._has_panes
+        through = self._through_panes(origin, direction, length, instant, behind)
+        return dr.select(free, 1, dr.select(behind, through, 0))
 
-    def _noise_at(self, face, corner_weight, active):
-        first = dr.gather(mi.Vector4f, self._uv, 2 * face, active)
-        rest = dr.gather(mi.Vector4f, self._uv, 2 * face + 1, active)
-        along, across = corner_weight
-        u = first[0] + along * first[2] + across * rest[0]
-        v = first[1] + along * first[3] + across * rest[1]
-        return self._noise.eval(mi.Point2f(u, v), active)[0]
+    def _through_panes(self, origin, direction, length, instant, active):
+        """Product of the clear shares of all surfaces on each ray, walked one by one."""
+
+        def onward(share, start, left_m, walking):
+            near = self._nearest(start, direction, left_m, instant, walking)
+            clear = dr.gather(mi.Float, self._uv, 8 * near.face + 7, near.valid)
+            step_m = near.distance_m + SURFACE_OFFSET_M
+            share = dr.select(near.valid, share * clear, share)
+            walking &= near.valid & (share > 0) & (step_m < left_m)
+            return share, dr.fma(direction, step_m, start), left_m - step_m, walking
+
+        state = (mi.Float(1), mi.Point3f(origin), mi.Float(length), mi.Bool(active))
+        return dr.while_loop(state, lambda *state: state[-1], onward, label="panes")[0]
+
+    def _nearest(self, origin, direction, length, instant, active, coherent=False) -> _Near:
+        tile = dr.gather(mi.Vector3f, self._tile, instant, active)
+        ray = _ray(origin, direction, length)
+        still = self._static.ray_intersect_preliminary(ray, coherent, active)
+        ray = _ray(origin + tile, direction, dr.minimum(still.t, length))
+        moved = self._moving.ray_intersect_preliminary(ray, coherent, active)
+        moves = moved.t < still.t
+        distance = dr.minimum(still.t, moved.t)
+        first = dr.select(moves, self._static_faces, 0)
+        posed_face = dr.select(moves, moved.prim_index, still.prim_index) + first
+        return _Near(
+            valid=active & (distance < length),
+            distance_m=distance,
+            posed_face=posed_face,
+            face=posed_face - dr.select(moves, instant * self._moving_faces, 0),
+            corner_weight=dr.select(moves, moved.prim_uv, still.prim_uv),
+        )
 
 
 def _ray(origin, direction, length):
