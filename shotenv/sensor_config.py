@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from shotenv.section import Fraction, NonNegative, Positive, Range, Section, check_range
+from unwrap.acquisition import harmonic_weights
 from unwrap.frequencies import joint_range_m, unambiguous_range_m
 
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
@@ -87,8 +88,18 @@ class SensorConfig(Section):
                 f"integration_s is {self.integration_s}; expected 0 < t < sample_period_s = "
                 f"{self.sample_period_s:g} s"
             )
+        self._check_overtones()
         self._check_ranges()
         return self
+
+    def _check_overtones(self) -> None:
+        weights = harmonic_weights(self.harmonic_strength, self.highest_harmonic)
+        demodulated = self.contrast * sum(weight for _, weight in weights)
+        if demodulated > 1.0:
+            raise ValueError(
+                f"contrast is {self.contrast:g} and harmonic_strength {self.harmonic_strength:g}: "
+                f"{demodulated:.3f} of the signal would be demodulated; expected at most 1"
+            )
 
     def _check_ranges(self) -> None:
         wrap_m = unambiguous_range_m(self.f1_hz)

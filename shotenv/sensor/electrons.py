@@ -65,5 +65,5 @@ def add_noise(charge_e: Tensor, normals: Tensor, read_noise_e: float) -> Tensor:
 
 
 def clip_to_full_well(charge_e: Tensor, full_well_e: float) -> Tensor:
-    """Charge limited in place to what a tap can hold and read, 0..full well, electrons."""
-    return charge_e.clamp_(0.0, full_well_e)
+    """Charge limited in place to what a tap can hold; read noise may take it below zero."""
+    return charge_e.clamp_(max=full_well_e)

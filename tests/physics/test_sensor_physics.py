@@ -144,7 +144,7 @@ def slow_reference(exposure, sensor, noise, pattern, y, x):
             sigma = math.sqrt(charge + sensor.read_noise_e**2)
             charge += sigma * float(noise[0, k, tap, y, x])
             saturated |= charge >= sensor.full_well_e
-            taps.append(min(max(charge, 0.0), sensor.full_well_e))
+            taps.append(min(charge, sensor.full_well_e))
         parity = 1 if y % 2 == 0 else -1
         rises = sensor.offset_ambient_lsb * min(ambient / 2 / sensor.full_well_e, 1.0)
         offset = float(pattern.pattern_lsb[0, y, x]) + parity * rises
