@@ -1,9 +1,10 @@
 """The clairvoyant optimum: what the best choice of shots costs when every outcome is known.
 
 Sensor noise depends on the drive's seed and the frame alone, so the cost and the heat of each
-action in each frame are fixed numbers; only the laser's temperature and its trip couple the
-frames. Dynamic programming over the discretised temperature and the trip solves that exactly up
-to the grid, and the resulting choices are then played with the undiscretised thermal model.
+action in each frame are fixed numbers, up to what a warm laser's efficiency adds to them; only
+the laser's temperature and its trip couple the frames. Dynamic programming over the discretised
+temperatures and the trip solves that exactly up to the grid, and the resulting choices are then
+played with the undiscretised thermal model.
 
 N drives, T frames, A = 3 actions throughout; temperatures in kelvin, heat in joules.
 """
@@ -17,9 +18,27 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-Advance = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 Choice = Callable[["Situation"], np.ndarray]
 Name = TypeVar("Name")
+
+
+class Laser(NamedTuple):
+    """State of each drive's laser, [N, ...] for several states of each.
+
+    `case_k` is the temperature of the case, `rise_k` what the junction is above it.
+    """
+
+    case_k: np.ndarray
+    rise_k: np.ndarray
+    tripped: np.ndarray
+
+    @property
+    def temperature_k(self) -> np.ndarray:
+        """Of the junction."""
+        return self.case_k + self.rise_k
+
+
+Advance = Callable[[Laser, np.ndarray], Laser]
 
 
 class Rule(NamedTuple):
@@ -37,29 +56,52 @@ class DriveTable:
     Attributes
     ----------
     cost : float64 [N, T, A]
-        Weighted cost (minus reward) of each action while the laser works.
+        Weighted cost (minus reward) of each action while the laser works, at 25 C.
+    laser_cost : float64 [N, A]
+        Part of it that pays for the laser's electrical energy.
+    surplus : callable
+        Share by which that energy is more at a junction temperature [N, ...] than at 25 C; any
+        shape that broadcasts.
     tripped_cost : float64 [N, T]
         Cost of a frame in which the laser is off because it tripped.
-    heat_j : float64 [N, T, A]
-        Heat that each action leaves in the laser.
+    heat_j : float64 [N, A]
+        Heat that each action leaves in the laser, at 25 C.
     start_k : float64 [N]
         Laser temperature before the first frame.
     snr : float64 [N, T, A]
         The observed feature `signal_to_noise` after each action.
     span_k : (low, high)
-        No laser gets colder or hotter than this, whatever is chosen.
+        No case gets colder or hotter than this, whatever is chosen.
+    highest_rise_k : float
+        No junction gets hotter than this above its case; 0 without a junction stage.
     advance : callable
-        The laser's thermal model over one frame: (temperature_k, tripped, heat_j), each [N, ...],
-        to the next (temperature_k, tripped). With `tripped`, the heat given is zero.
+        The laser's thermal model over one frame: (laser, heat at 25 C) to the next laser; the two
+        broadcast. With `tripped`, the heat given is zero.
     """
 
     cost: np.ndarray
+    laser_cost: np.ndarray
+    surplus: Callable[[np.ndarray], np.ndarray]
     tripped_cost: np.ndarray
     heat_j: np.ndarray
     start_k: np.ndarray
     snr: np.ndarray
     span_k: tuple[float, float]
+    highest_rise_k: float
     advance: Advance
+
+    def cost_at(self, frame: int, temperature_k: np.ndarray) -> np.ndarray:
+        """Cost of each action at junction temperatures [N, ...]: [N, ..., A]."""
+        surplus = np.expand_dims(self.surplus(temperature_k), -1)
+        cost, laser_cost = (
+            _beside(values, temperature_k) for values in (self.cost[:, frame], self.laser_cost)
+        )
+        return cost + laser_cost * surplus
+
+    def start(self) -> Laser:
+        """The lasers before the first frame."""
+        none = np.zeros(len(self.start_k))
+        return Laser(self.start_k.copy(), none, none.astype(bool))
 
 
 @dataclass(frozen=True)
@@ -70,8 +112,8 @@ class Situation:
     ----------
     frame : int
         Number of the frame.
-    temperature_k, tripped : [N]
-        State of each drive's laser.
+    laser : Laser
+        Of each drive, [N].
     snr : [N]
         Feature `signal_to_noise` of the last acquisition, 0 before the first.
     table : DriveTable
@@ -79,15 +121,14 @@ class Situation:
     """
 
     frame: int
-    temperature_k: np.ndarray
-    tripped: np.ndarray
+    laser: Laser
     snr: np.ndarray
     table: DriveTable
 
     @property
     def cost(self) -> np.ndarray:
         """Cost of each action in this frame, [N, A]."""
-        return self.table.cost[:, self.frame]
+        return self.table.cost_at(self.frame, self.laser.temperature_k)
 
 
 @dataclass(frozen=True)
@@ -120,33 +161,32 @@ class Played:
 def play(table: DriveTable, choose: Choice) -> Played:
     """Play every drive of `table`, asking `choose` for the actions [N] of each frame."""
     drives, frames, _ = table.cost.shape
-    temperature_k, tripped = table.start_k.copy(), np.zeros(drives, dtype=bool)
+    laser, snr, cost = table.start(), np.zeros(drives), np.zeros(drives)
     rows, actions = np.arange(drives), np.empty((drives, frames), np.int64)
-    cost, snr = np.zeros(drives), np.zeros(drives)
     for frame in range(frames):
-        chosen = choose(Situation(frame, temperature_k, tripped, snr, table))
-        actions[:, frame] = np.where(tripped, -1, chosen)
-        working = table.cost[rows, frame, chosen]
-        cost += np.where(tripped, table.tripped_cost[:, frame], working)
-        snr = np.where(tripped, snr, table.snr[rows, frame, chosen])
-        heat_j = np.where(tripped, 0.0, table.heat_j[rows, frame, chosen])
-        temperature_k, tripped = table.advance(temperature_k, tripped, heat_j)
+        now = Situation(frame, laser, snr, table)
+        chosen = choose(now)
+        actions[:, frame] = np.where(laser.tripped, -1, chosen)
+        cost += np.where(laser.tripped, table.tripped_cost[:, frame], now.cost[rows, chosen])
+        snr = np.where(laser.tripped, snr, table.snr[rows, frame, chosen])
+        heat_j = np.where(laser.tripped, 0.0, table.heat_j[rows, chosen])
+        laser = table.advance(laser, heat_j)
     return Played(actions, cost)
 
 
-def clairvoyant(table: DriveTable, *, levels: int = 801) -> Played:
-    """Optimum over all choices, by dynamic programming on `levels` temperatures."""
-    grid = np.linspace(*table.span_k, levels)
+def clairvoyant(table: DriveTable, *, levels: int = 801, rise_levels: int = 25) -> Played:
+    """Optimum over all choices, by dynamic programming on a grid of temperatures.
+
+    `levels` temperatures of the case; with a junction stage a quarter of them, times `rise_levels`
+    rises of the junction.
+    """
+    grid = _grid(table, levels, rise_levels)
     values = _values_to_go(table, grid)
-    drives = np.arange(table.cost.shape[0])
 
     def choose(now: Situation) -> np.ndarray:
         """Action of least cost now plus least cost from then on."""
-        to_go = [
-            _look_up(values[now.frame + 1], grid, *after)[drives]
-            for after in _consequences(table, now.frame, now.temperature_k, now.tripped)
-        ]
-        return np.argmin(now.cost + np.stack(to_go, axis=-1), axis=-1)
+        to_go = _look_up(values[now.frame + 1], _corners(grid, _consequences(table, now.laser)))
+        return np.argmin(now.cost + to_go, axis=-1)
 
     return play(table, choose)
 
@@ -155,8 +195,7 @@ def greedy(table: DriveTable, *, guarded: bool) -> Played:
     """Least cost of this frame alone; `guarded` avoids actions that trip the laser at once."""
 
     def choose(now: Situation) -> np.ndarray:
-        after = _consequences(table, now.frame, now.temperature_k, now.tripped)
-        trips = np.stack([tripped for _, tripped in after], axis=-1)
+        trips = _consequences(table, now.laser).tripped
         barred = trips & ~trips.all(axis=-1, keepdims=True) & guarded
         return np.argmin(np.where(barred, np.inf, now.cost), axis=-1)
 
@@ -165,12 +204,12 @@ def greedy(table: DriveTable, *, guarded: bool) -> Played:
 
 def fixed(action: int) -> Choice:
     """Choose `action` in every frame."""
-    return lambda now: np.full(now.tripped.shape, action)
+    return lambda now: np.full(now.snr.shape, action)
 
 
 def cycle(pattern: tuple[int, ...]) -> Choice:
     """Repeat a pattern of actions, frame after frame."""
-    return lambda now: np.full(now.tripped.shape, pattern[now.frame % len(pattern)])
+    return lambda now: np.full(now.snr.shape, pattern[now.frame % len(pattern)])
 
 
 def mixture(shares: tuple[float, float, float], *, seed: int = 0) -> Choice:
@@ -178,7 +217,7 @@ def mixture(shares: tuple[float, float, float], *, seed: int = 0) -> Choice:
     edges = np.cumsum(shares)[:-1]
 
     def choose(now: Situation) -> np.ndarray:
-        draw = np.random.default_rng((seed, now.frame)).random(now.tripped.shape)
+        draw = np.random.default_rng((seed, now.frame)).random(now.snr.shape)
         return np.searchsorted(edges, draw, side="right")
 
     return choose
@@ -221,43 +260,94 @@ def blind_choices(longest: int = 8, steps: int = 5) -> Iterator[tuple[str, Choic
 _SHOTS = (2, 4, 8)
 
 
-def _values_to_go(table: DriveTable, grid: np.ndarray) -> np.ndarray:
-    """Least cost from each frame on, [T + 1, 2 (tripped), N, grid levels]."""
-    drives, frames, _ = table.cost.shape
-    values = np.zeros((frames + 1, 2, drives, grid.size))
-    everywhere = np.broadcast_to(grid, (drives, grid.size))
-    off = np.ones(everywhere.shape, dtype=bool)
-    for frame in reversed(range(frames)):
-        after = _consequences(table, frame, everywhere, ~off)
-        to_go = [_look_up(values[frame + 1], grid, *state) for state in after]
-        cost = table.cost[:, frame].T[:, :, None]
-        values[frame, 0] = np.min(cost + np.stack(to_go), axis=0)
-        cooled = table.advance(everywhere, off, np.zeros(everywhere.shape))
-        values[frame, 1] = table.tripped_cost[:, frame, None] + _look_up(
-            values[frame + 1], grid, *cooled
+class _Grid(NamedTuple):
+    """Evenly spaced temperatures of the case, and rises of the junction above it."""
+
+    case_k: np.ndarray
+    rise_k: np.ndarray
+
+    def everywhere(self, drives: int, *, tripped: bool) -> Laser:
+        """A laser at every point of the grid, [N, K]."""
+        case_k, rise_k = np.meshgrid(self.case_k, self.rise_k, indexing="ij")
+        shape = drives, case_k.size
+        return Laser(
+            np.broadcast_to(case_k.ravel(), shape),
+            np.broadcast_to(rise_k.ravel(), shape),
+            np.full(shape, tripped),
         )
+
+
+def _grid(table: DriveTable, levels: int, rise_levels: int) -> _Grid:
+    if not table.highest_rise_k:
+        return _Grid(np.linspace(*table.span_k, levels), np.zeros(1))
+    rises_k = np.linspace(0.0, table.highest_rise_k, rise_levels)
+    return _Grid(np.linspace(*table.span_k, levels // 4), rises_k)
+
+
+def _values_to_go(table: DriveTable, grid: _Grid) -> np.ndarray:
+    """Least cost from each frame on, [T + 1, 2 (tripped), N, case levels, rise levels]."""
+    drives, frames, _ = table.cost.shape
+    shape = drives, grid.case_k.size, grid.rise_k.size
+    values = np.zeros((frames + 1, 2, *shape))
+    on, off = (grid.everywhere(drives, tripped=tripped) for tripped in (False, True))
+    warmed = _corners(grid, _consequences(table, on))
+    cooled = _corners(grid, table.advance(off, np.zeros(off.case_k.shape)))
+    for frame in reversed(range(frames)):
+        cost, to_go = table.cost_at(frame, on.temperature_k), values[frame + 1]
+        working = np.min(cost + _look_up(to_go, warmed), axis=-1)
+        tripped = table.tripped_cost[:, frame, None] + _look_up(to_go, cooled)
+        values[frame] = working.reshape(shape), tripped.reshape(shape)
     return values
 
 
-def _consequences(
-    table: DriveTable, frame: int, temperature_k: np.ndarray, tripped: np.ndarray
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Next (temperature, tripped) after each action, for temperatures [N] or [N, levels]."""
-    heat_j = table.heat_j[:, frame].reshape(-1, *[1] * (temperature_k.ndim - 1), 3)
-    return [
-        table.advance(temperature_k, tripped, np.where(tripped, 0.0, heat_j[..., action]))
-        for action in range(heat_j.shape[-1])
-    ]
+def _consequences(table: DriveTable, laser: Laser) -> Laser:
+    """The lasers [N, ...] one frame later, after each action: [N, ..., A]."""
+    heat_j = _beside(table.heat_j, laser.case_k)
+    before = Laser(*(np.expand_dims(value, -1) for value in laser))
+    return table.advance(before, np.where(before.tripped, 0.0, heat_j))
 
 
-def _look_up(
-    values: np.ndarray, grid: np.ndarray, temperature_k: np.ndarray, tripped: np.ndarray
-) -> np.ndarray:
-    """Interpolate values [2, N, levels] at a temperature and trip per drive ([N] or [N, K])."""
-    position = (temperature_k - grid[0]) / (grid[1] - grid[0])
-    position = np.clip(position, 0.0, grid.size - 1.0)
-    below = np.minimum(position.astype(np.int64), grid.size - 2)
-    weight = position - below
-    drive = np.arange(len(temperature_k)).reshape(-1, *[1] * (temperature_k.ndim - 1))
-    state = tripped.astype(np.int64)
-    return (1.0 - weight) * values[state, drive, below] + weight * values[state, drive, below + 1]
+def _beside(values: np.ndarray, states: np.ndarray) -> np.ndarray:
+    """Values [N, A] of each drive for states [N, ...] of it: [N, ..., A], broadcast."""
+    return values.reshape(len(values), *[1] * (states.ndim - 1), -1)
+
+
+class _Corners(NamedTuple):
+    """Points of the grid around some lasers [N, ...]: where they are stored, and their weights.
+
+    Both are [2 or 4, N, ...].
+    """
+
+    stored: np.ndarray
+    weight: np.ndarray
+
+
+def _corners(grid: _Grid, laser: Laser) -> _Corners:
+    """The grid points that a value is interpolated from."""
+    case_k, rise_k, tripped = np.broadcast_arrays(*laser)
+    drive = np.arange(len(case_k)).reshape(-1, *[1] * (case_k.ndim - 1))
+    row = (tripped * len(case_k) + drive) * grid.case_k.size
+    stored, weight = zip(
+        *(
+            ((row + case) * grid.rise_k.size + rise, near * close)
+            for case, near in _ends(grid.case_k, case_k)
+            for rise, close in _ends(grid.rise_k, rise_k)
+        ),
+        strict=True,
+    )
+    return _Corners(np.stack(stored), np.stack(weight))
+
+
+def _look_up(values: np.ndarray, corners: _Corners) -> np.ndarray:
+    """Interpolate values [2, N, case levels, rise levels] of the grid."""
+    return (values.reshape(-1).take(corners.stored) * corners.weight).sum(axis=0)
+
+
+def _ends(axis: np.ndarray, value: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Grid levels around each value: their index and weight."""
+    if axis.size == 1:
+        return [(np.zeros(value.shape, np.int64), np.ones(value.shape))]
+    position = np.clip((value - axis[0]) / (axis[1] - axis[0]), 0.0, axis.size - 1.0)
+    below = np.minimum(position.astype(np.int64), axis.size - 2)
+    share = position - below
+    return [(below, 1.0 - share), (below + 1, share)]

@@ -54,7 +54,9 @@ class LaserConfig(Section):
 
     name: str = Field(description="name of the light source")
     optical_power_w: Range = Field((4.0, 10.0), description="mean optical power while on, W")
-    efficiency: Fraction = Field(0.42, gt=0.0, description="optical over electrical power at 25 C")
+    efficiency: float = Field(
+        0.42, gt=0.0, lt=1.0, description="optical over electrical power at 25 C"
+    )
     efficiency_slope_per_k: Fraction = Field(
         0.0, description="share of 1 by which the efficiency falls per kelvin above 25 C"
     )

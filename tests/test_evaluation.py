@@ -48,7 +48,7 @@ def test_tables_tell_what_the_environment_does(config, possible):
     table = possible.table(config.env.reward)
     rule = (float(np.median(table.snr)), 2, 0)
     for policy, choose in [
-        (FixedPolicy(8), lambda now: np.full(now.tripped.shape, 2)),
+        (FixedPolicy(8), lambda now: np.full(now.snr.shape, 2)),
         (SnrThresholdPolicy(tuple(FEATURES), rule[0], below=8, above=2), threshold(*rule)),
     ]:
         played, on_table = play_drives(policy, envs, SEEDS), play(table, choose)
@@ -59,7 +59,7 @@ def test_tables_tell_what_the_environment_does(config, possible):
 
 def test_the_hot_laser_trips_and_the_optimum_beats_every_fixed_choice(config, possible):
     table = possible.table(config.env.reward)
-    eight = play(table, lambda now: np.full(now.tripped.shape, 2))
+    eight = play(table, lambda now: np.full(now.snr.shape, 2))
     assert eight.tripped_share > 0
     assert (clairvoyant(table).cost <= eight.cost + 1e-9).all()
 

@@ -6,6 +6,7 @@ import pytest
 
 from agents.optimum import (
     DriveTable,
+    Laser,
     Situation,
     best_choice,
     blind_choices,
@@ -20,27 +21,48 @@ from agents.optimum import (
 )
 
 TRIP_K, RELEASE_K, AMBIENT_K, DECAY = 330.0, 325.0, 300.0, 0.7
+JUNCTION_DECAY = 0.4
 
 
-def advance(temperature_k, tripped, heat_j):
+def trip(case_k, rise_k, tripped):
+    hot_k = case_k + rise_k
+    return Laser(case_k, rise_k, np.where(tripped, hot_k > RELEASE_K, hot_k >= TRIP_K))
+
+
+def one_stage(laser, heat_j):
     """First-order package with a hysteretic trip; one joule heats by one kelvin."""
-    warm = AMBIENT_K + (temperature_k - AMBIENT_K) * DECAY + heat_j
-    return warm, np.where(tripped, warm > RELEASE_K, warm >= TRIP_K)
+    case_k = AMBIENT_K + (laser.case_k - AMBIENT_K) * DECAY + heat_j
+    return trip(case_k, laser.rise_k, laser.tripped)
 
 
-def draw_table(seed, *, drives=6, frames=7, heat=(3.0, 8.0, 16.0)):
+def two_stages(laser, heat_j):
+    """Half of the heat's effect in a faster stage on top."""
+    case_k = AMBIENT_K + (laser.case_k - AMBIENT_K) * DECAY + 0.5 * heat_j
+    return trip(case_k, laser.rise_k * JUNCTION_DECAY + 0.5 * heat_j, laser.tripped)
+
+
+def warming(slope):
+    """Electrical energy that grows by `slope` per kelvin above ambient."""
+    return lambda temperature_k: slope * (temperature_k - AMBIENT_K)
+
+
+def draw_table(seed, *, drives=6, frames=7, heat=(3.0, 8.0, 16.0), **changes):
     rng = np.random.default_rng(seed)
     cost = rng.random((drives, frames, 3)) + np.array([0.5, 0.3, 0.0])
-    heat_j = np.broadcast_to(np.array(heat), cost.shape) * rng.uniform(0.8, 1.2, (drives, 1, 1))
-    return DriveTable(
+    heat_j = np.array(heat) * rng.uniform(0.8, 1.2, (drives, 1))
+    table = DriveTable(
         cost=cost,
+        laser_cost=np.zeros((drives, 3)),
+        surplus=warming(0.0),
         tripped_cost=np.full((drives, frames), 3.0),
         heat_j=heat_j,
         snr=rng.random(cost.shape),
         start_k=np.full(drives, 310.0),
         span_k=(300.0, 360.0),
-        advance=advance,
+        highest_rise_k=0.0,
+        advance=one_stage,
     )
+    return dataclasses.replace(table, **changes)
 
 
 def brute_force(table):
@@ -53,13 +75,44 @@ def brute_force(table):
 
 
 def repeat(action, now):
-    return np.full(now.tripped.shape, action)
+    return np.full(now.snr.shape, action)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_dynamic_programming_finds_the_optimum_of_every_sequence(seed):
     table = draw_table(seed, frames=6)
     np.testing.assert_allclose(clairvoyant(table, levels=4001).cost, brute_force(table), atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_two_stages_have_their_optimum_too(seed):
+    highest_k = 0.5 * 16.0 * 1.2 / (1.0 - JUNCTION_DECAY)
+    table = draw_table(seed, frames=5, advance=two_stages, highest_rise_k=highest_k)
+    best = brute_force(table)
+    found = clairvoyant(table, levels=1600, rise_levels=65).cost
+    np.testing.assert_allclose(found, best, rtol=1e-3)
+    # The second stage matters: the rise alone is worth several kelvin at the trip.
+    blind = dataclasses.replace(table, advance=one_stage, highest_rise_k=0.0)
+    assert not np.allclose(brute_force(blind), best, rtol=1e-2)
+
+
+def test_the_optimum_knows_that_a_warm_laser_costs_more():
+    extra = np.tile([0.2, 0.4, 0.8], (6, 1))
+    table = draw_table(11, frames=5, laser_cost=extra, surplus=warming(0.05))
+    found = clairvoyant(table, levels=4001)
+    np.testing.assert_allclose(found.cost, brute_force(table), atol=1e-9)
+    assert (found.cost > clairvoyant(draw_table(11, frames=5)).cost + 0.1).all()
+
+
+def test_the_surplus_is_paid_at_the_temperature_of_each_frame():
+    extra = np.tile([0.0, 0.0, 2.0], (1, 1))
+    table = draw_table(12, drives=1, frames=3, heat=(0, 0, 2), laser_cost=extra)
+    dear = dataclasses.replace(table, surplus=warming(0.1))
+    laser, expected = table.start(), play(table, fixed(2)).cost[0]
+    for _ in range(3):
+        expected += 2.0 * 0.1 * (laser.temperature_k[0] - AMBIENT_K)
+        laser = table.advance(laser, table.heat_j[:, 2])
+    assert play(dear, fixed(2)).cost[0] == pytest.approx(expected)
 
 
 def test_a_look_ahead_pays_where_heat_matters():
@@ -108,7 +161,7 @@ def test_no_blind_choice_beats_the_optimum():
 
 def test_cycle_and_mixture_ignore_the_drive():
     table = draw_table(7)
-    now = Situation(4, table.start_k, np.zeros(6, bool), np.zeros(6), table)
+    now = Situation(4, table.start(), np.zeros(6), table)
     np.testing.assert_array_equal(cycle((2, 0, 0))(now), np.zeros(6))
     np.testing.assert_array_equal(mixture((0.0, 1.0, 0.0))(now), np.ones(6))
 
