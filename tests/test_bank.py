@@ -18,7 +18,6 @@ from shotenv.bank.store import (
     ARRAYS,
     frame_bytes,
     read_clip_record,
-    read_manifest,
     verify,
     write_clip,
     write_manifest,
@@ -360,26 +359,3 @@ def test_unwritable_cache_folder_is_named(config, tmp_path):
     blocker.write_text("")
     with pytest.raises(BankError, match="SHOTENV_CACHE"):
         build_bank(config, blocker / "bank")
-
-
-@pytest.mark.render
-def test_building_resumes_and_gives_a_whole_bank(config, tmp_path):
-    small = merged(
-        config,
-        {
-            "camera": {"width": 32, "height": 24, "samples_per_pixel": 1, "gray_instants": 1},
-            "world": {"frames_per_clip": 2, "families": ["garage"]},
-            "shift_clips": 0,
-        },
-    )
-    folder = build_bank(small, tmp_path / "bank", workers=1)
-    first = read_manifest(folder)
-    (folder / "manifest.json").unlink()
-    removed = folder / first.clips[1].folder
-    for path in removed.iterdir():
-        path.unlink()
-    removed.rmdir()
-    build_bank(small, folder, workers=1)
-    assert read_manifest(folder) == first
-    assert verify(folder) == ()
-    assert np.isfinite(open_bank(folder).frame(0).exposure.correlation.numpy()).all()
