@@ -17,6 +17,7 @@ def wall_material(rng: np.random.Generator) -> Material:
     return (m.PLASTER, m.BRICK, m.CONCRETE)[rng.integers(3)].draw(rng)
 
 
+@meshes.thing
 def wall(rng: np.random.Generator, length_m: float, height_m: float) -> Mesh:
     """A free-standing wall along y with a plinth and a coping."""
     body, trim = wall_material(rng), m.CONCRETE.draw(rng)
@@ -29,6 +30,7 @@ def wall(rng: np.random.Generator, length_m: float, height_m: float) -> Mesh:
     )
 
 
+@meshes.thing
 def facade(rng: np.random.Generator, length_m: float, lit: bool = False) -> Mesh:
     """The street side of a building along y: plinth, ledge, rows of windows, doors."""
     height, body, trim = rng.uniform(6.0, 10.0), wall_material(rng), m.CONCRETE.draw(rng)
@@ -74,6 +76,7 @@ def door_leaf(rng: np.random.Generator, y: float) -> Mesh:
     )
 
 
+@meshes.thing
 def roller_door(rng: np.random.Generator, width_m: float = 2.6) -> Mesh:
     """A garage door of horizontal slats in a concrete wall."""
     light, dark = m.METAL.draw(rng), m.DARK_METAL.draw(rng)
@@ -85,6 +88,7 @@ def roller_door(rng: np.random.Generator, width_m: float = 2.6) -> Mesh:
     return meshes.join([body, *slats])
 
 
+@meshes.thing
 def pillar(rng: np.random.Generator, height_m: float) -> Mesh:
     """A square or round concrete pillar with a painted warning band."""
     concrete, paint, dark = m.CONCRETE.draw(rng), m.WHITE_PAINT.draw(rng), m.RUBBER.draw(rng)

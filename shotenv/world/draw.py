@@ -7,10 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shotenv.config import FAMILIES, Family, Range, WorldConfig
-from shotenv.world import enclosed, lights, roads
+from shotenv.config import Family, Range, WorldConfig
+from shotenv.world import construction, enclosed, forest, lights, roads, snow, warehouse
 from shotenv.world.model import Light, Motion, Pose, World
 from shotenv.world.site import Site
+from shotenv.world.weather import draw_weather
+
+DrawLight = Callable[[np.random.Generator], Light]
 
 LONGEST_DRIVE_M = 90.0
 """A world is about this long: a clip of many frames is driven more slowly."""
@@ -29,6 +32,17 @@ class Place:
     yaw_std_rad: float
 
 
+@dataclass(frozen=True)
+class Setting:
+    """What a family is drawn from: places, light, and the shares of wet and of snowy worlds."""
+
+    places: tuple[Place, ...]
+    light: DrawLight
+    wet_share: float = 0.0
+    snow_share: float = 0.0
+    snow_cover: Range = (0.3, 0.7)
+
+
 def _garage(site: Site, rng: np.random.Generator) -> None:
     enclosed.garage(site, rng, irradiance=(5e-3, 0.1))
 
@@ -37,8 +51,20 @@ def _tunnel(site: Site, rng: np.random.Generator) -> None:
     enclosed.tunnel(site, rng, irradiance=(5e-3, 0.1))
 
 
-def _daylight(rng: np.random.Generator) -> Light:
-    return lights.sunny(rng) if rng.random() < 0.6 else lights.overcast(rng)
+def _warehouse(site: Site, rng: np.random.Generator) -> None:
+    warehouse.hall(site, rng, irradiance=(1e-2, 0.15))
+
+
+def _either(sun_share: float, low_share: float, night_share: float = 0.0) -> DrawLight:
+    """Sun (low with its own probability), night, or an overcast sky."""
+
+    def draw(rng: np.random.Generator) -> Light:
+        kind = rng.random()
+        if kind < sun_share:
+            return lights.sunny(rng, low_share)
+        return lights.night(rng) if kind < sun_share + night_share else lights.overcast(rng)
+
+    return draw
 
 
 def _open_places(country: float, town: float, park: float) -> tuple[Place, ...]:
@@ -49,19 +75,31 @@ def _open_places(country: float, town: float, park: float) -> tuple[Place, ...]:
     )
 
 
-PLACES: dict[Family, tuple[Place, ...]] = {
-    "sunny_road": _open_places(0.50, 0.25, 0.25),
-    "overcast_street": _open_places(0.10, 0.60, 0.30),
-    "garage": (Place(_garage, (0.0, 3.0), 1.0, 0.1),),
-    "tunnel": (Place(_tunnel, (2.0, 15.0), 1.0, 0.02),),
-    "night_road": _open_places(0.40, 0.35, 0.25),
-}
-LIGHTS: dict[Family, Callable[[np.random.Generator], Light]] = {
-    "sunny_road": lights.sunny,
-    "overcast_street": lights.overcast,
-    "garage": lights.overcast,
-    "tunnel": _daylight,
-    "night_road": lights.night,
+SETTINGS: dict[Family, Setting] = {
+    "sunny_road": Setting(_open_places(0.50, 0.25, 0.25), lights.sunny, wet_share=0.15),
+    "overcast_street": Setting(
+        _open_places(0.10, 0.60, 0.30), lights.overcast, wet_share=0.40, snow_share=0.12
+    ),
+    "garage": Setting((Place(_garage, (0.0, 3.0), 1.0, 0.1),), lights.overcast),
+    "tunnel": Setting((Place(_tunnel, (2.0, 15.0), 1.0, 0.02),), _either(0.6, 0.3)),
+    "night_road": Setting(
+        _open_places(0.40, 0.35, 0.25), lights.night, wet_share=0.40, snow_share=0.08
+    ),
+    "warehouse": Setting((Place(_warehouse, (0.0, 3.0), 1.0, 0.1),), lights.overcast),
+    "construction_site": Setting(
+        (Place(construction.construction_site, (0.0, 6.0), 1.0, 0.05),),
+        _either(0.5, 0.3, night_share=0.25),
+        wet_share=0.3,
+    ),
+    "forest_path": Setting(
+        (Place(forest.forest_path, (0.0, 4.0), 1.0, 0.05),), _either(0.6, 0.5), wet_share=0.2
+    ),
+    "snowy_street": Setting(
+        (Place(snow.snowy_street, (0.0, 8.0), 1.0, 0.03),),
+        _either(0.5, 0.7, night_share=0.2),
+        snow_share=1.0,
+        snow_cover=(0.7, 1.0),
+    ),
 }
 
 
@@ -84,18 +122,20 @@ def draw_world(family: Family, seed: int, config: WorldConfig) -> World:
     ValueError
         An unknown family, a negative seed, or a slowest speed that leaves the world.
     """
-    if family not in FAMILIES:
-        raise ValueError(f"family is {family!r}; expected one of {', '.join(FAMILIES)}")
+    if family not in SETTINGS:
+        raise ValueError(f"family is {family!r}; expected one of {', '.join(SETTINGS)}")
     if seed < 0:
         raise ValueError(f"seed is {seed}; expected a non-negative integer")
-    rng = np.random.default_rng([FAMILIES.index(family), seed])
-    places = PLACES[family]
-    place = places[rng.choice(len(places), p=[place.share for place in places])]
-    light = LIGHTS[family](rng)
+    # Seeded by its name, a family keeps its worlds when others come or go.
+    rng = np.random.default_rng([*family.encode(), seed])
+    setting = SETTINGS[family]
+    place = setting.places[rng.choice(len(setting.places), p=[p.share for p in setting.places])]
+    light = setting.light(rng)
+    weather = draw_weather(rng, setting.wet_share, setting.snow_share, setting.snow_cover)
     duration_s = config.frames_per_clip / config.frame_rate_hz
     speed = ego_speed(rng, place.speed_m_s, duration_s, config)
     ego = draw_ego(rng, speed, duration_s, place.yaw_std_rad)
-    site = Site(ego, duration_s, night=family == "night_road")
+    site = Site(ego, duration_s, lights.is_dark(light), weather)
     place.lay_out(site, rng)
     return site.world(family, seed, light)
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from shotenv.config import Range
-from shotenv.world import buildings, furniture, lights, meshes, vehicles
+from shotenv.world import buildings, cycles, furniture, lights, meshes, plants, vehicles
 from shotenv.world import materials as m
 from shotenv.world.model import Indoor, Lamp, Motion, Pose
 from shotenv.world.roads import BEHIND_M, PAINT_M, REACH_M
 from shotenv.world.site import Site
-from shotenv.world.traffic import approaching_car, crossing, lead, row, walkers
+from shotenv.world.traffic import approaching, crossing, lead, row, walkers
 
 TUBE_LAMP_M = 1.4
 TUBE_WIDTH_M = 0.12
@@ -47,14 +49,16 @@ def garage(site: Site, rng: np.random.Generator, irradiance: Range) -> None:
     walkers(site, rng, (1, 3), (-aisle / 2 + 0.3, aisle / 2 - 0.3))
     if rng.random() < 0.35:
         x = rng.uniform(8.0, 20.0) + site.travel_m
-        approaching_car(site, rng, Motion(Pose((x, aisle / 4, 0.0), np.pi), rng.uniform(0.5, 3.0)))
+        path = Motion(Pose((x, aisle / 4, 0.0), np.pi), rng.uniform(0.5, 3.0))
+        approaching(site, rng, path, vehicles.car)
     lead(site, rng)
     row(site, rng, pavement_low, rng.choice([-1, 1]) * (aisle / 2 - 0.2), 4.0, 0.0, share=0.4)
 
 
 def pavement_low(rng: np.random.Generator) -> meshes.Mesh:
     """Something that fits under a garage's ceiling."""
-    things = (furniture.crate, furniture.rubbish_bin, furniture.cone, furniture.bollard)
+    things = (furniture.crate, furniture.rubbish_bin, furniture.cone, furniture.bollard,
+              cycles.bicycle, furniture.cabinet)  # fmt: skip
     return things[rng.integers(len(things))](rng)
 
 
@@ -62,7 +66,8 @@ def shell(site: Site, rng: np.random.Generator, end: float, half: float, height:
     """Floor, ceiling with beams and a pipe, side walls, an end wall that may have an opening."""
     start, wall = -10.0, buildings.wall_material(rng)
     concrete = m.CONCRETE.draw(rng)
-    site.build(meshes.patch((start, end), (-half, half), 0.0, m.CONCRETE.draw(rng)))
+    floor = (m.CONCRETE if rng.random() < 0.5 else m.COATED_FLOOR).draw(rng)
+    site.build(meshes.patch((start, end), (-half, half), 0.0, floor))
     size = (end - start + 2.0, 2 * half + 2.0, SLAB_M)
     site.build(meshes.box(size, concrete, ((start + end) / 2, 0.0, height)))
     for x in np.arange(start + 2.0, end, 5.2):
@@ -82,23 +87,53 @@ def shell(site: Site, rng: np.random.Generator, end: float, half: float, height:
 def end_wall(
     site: Site, rng: np.random.Generator, end: float, half: float, height: float, wall: m.Material
 ) -> None:
-    """Closed, or a parapet with daylight above it; outside there are trees and ground."""
+    """Closed, or a ramp up into daylight, or a parapet with daylight above it."""
     box = (-BEHIND_M, -half - 1.0, -1.0), (end, half + 1.0, height + SLAB_M)
-    if rng.random() < 0.55:
+    kind, lintel = rng.random(), rng.uniform(0.2, 0.5)
+    if kind < 0.45:
         site.indoor = Indoor(*box, None)
         site.put(meshes.box((0.3, 2 * half, height), wall), end + 0.15, 0.0)
         band = meshes.back((-half, half), (0.5, 0.75), end - 0.012, m.WHITE_PAINT.draw(rng))
         site.build(band)
         return
-    parapet, lintel = rng.uniform(0.7, 1.1), rng.uniform(0.2, 0.5)
+    site.build(meshes.box((0.3, 2 * half, lintel), wall, (end + 0.15, 0.0, height - lintel)))
+    if kind < 0.7:
+        width = rng.uniform(3.4, 4.6)
+        site.indoor = Indoor(*box, ((-width / 2, 0.0), (width / 2, height - lintel)))
+        beside, middle = half - width / 2, (half + width / 2) / 2
+        for side in (-1, 1):
+            site.put(meshes.box((0.3, beside, height), wall), end + 0.15, side * middle)
+        ramp(site, rng, end, width, height + SLAB_M, wall)
+        return
+    parapet = rng.uniform(0.7, 1.1)
     site.indoor = Indoor(*box, ((-half, parapet), (half, height - lintel)))
     site.put(meshes.box((0.3, 2 * half, parapet), wall), end + 0.15, 0.0)
-    site.build(meshes.box((0.3, 2 * half, lintel), wall, (end + 0.15, 0.0, height - lintel)))
     site.build(
         meshes.patch((end + 0.3, end + REACH_M), (-REACH_M, REACH_M), 0.0, m.GRASS.draw(rng))
     )
     for y in rng.uniform(-8.0, 8.0, rng.integers(1, 4)):
-        site.put(furniture.tree(rng), end + rng.uniform(3.0, 12.0), y)
+        site.put(plants.tree(rng), end + rng.uniform(3.0, 12.0), y)
+
+
+def ramp(
+    site: Site, rng: np.random.Generator, foot: float, width: float, rise: float, wall: m.Material
+) -> None:
+    """A way up to the street between two walls, with ribs across it; at its top stand trees."""
+    length, half = rise / rng.uniform(0.13, 0.20), width / 2
+    head, concrete = foot + length, m.CONCRETE.draw(rng)
+    slope = [(foot, -half, 0.0), (head, -half, rise), (head, half, rise), (foot, half, 0.0)]
+    site.build(replace(meshes.polygon(slope, concrete), kinds=frozenset({"ramp"})))
+    rib = m.DARK_METAL.draw(rng)
+    for share in np.arange(0.02, 1.0, 0.45 / length):
+        x, z = foot + share * length, share * rise
+        site.build(meshes.box((0.04, width - 0.6, 0.02), rib, (x, 0.0, z)))
+    for side in (-1, 1):
+        size = (length, 0.25, rise + 0.9)
+        site.build(meshes.box(size, wall, ((foot + head) / 2 + 0.3, side * (half + 0.13), 0.0)))
+    street = m.PAVING.draw(rng)
+    site.build(meshes.patch((head, head + REACH_M), (-REACH_M, REACH_M), rise, street))
+    for y in rng.uniform(-3.0, 3.0, rng.integers(1, 3)):
+        site.build(meshes.at(plants.tree(rng), head + rng.uniform(2.0, 6.0), y, rise))
 
 
 def bay_lines(site: Site, rng: np.random.Generator, end: float, aisle: float, depth: float) -> None:
@@ -129,7 +164,7 @@ def parked(
     for x in np.arange(rng.uniform(0.5, 2.0), min(end - 1.0, site.travel_m + 24.0), bay):
         if rng.random() < share:
             yaw = side * (np.pi / 2) + rng.integers(2) * np.pi
-            site.put(vehicles.car(rng), x, y, yaw + rng.uniform(-0.03, 0.03))
+            site.put(vehicles.parked_car(rng), x, y, yaw + rng.uniform(-0.03, 0.03))
 
 
 def ceiling_lamps(
@@ -176,7 +211,7 @@ def tunnel(site: Site, rng: np.random.Generator, irradiance: Range) -> None:
     lead(site, rng)
     if rng.random() < 0.6:
         x = rng.uniform(6.0, 26.0) + 0.5 * site.travel_m
-        approaching_car(site, rng, Motion(Pose((x, lane, 0.0), np.pi), rng.uniform(3.0, 14.0)))
+        approaching(site, rng, Motion(Pose((x, lane, 0.0), np.pi), rng.uniform(3.0, 14.0)))
     walkers(site, rng, (0, 2), (centre - half + 0.3, centre - half + 0.5), 0.15)
 
 
@@ -251,5 +286,5 @@ def outside(
             rail = furniture.guard_rail(rng, 16.0)
             site.put(rail, exit_x + 9.0, edge + 0.5 * side, -side * np.pi / 2)
         for x in np.arange(exit_x + 2.0, exit_x + 26.0, 5.0):
-            thing = furniture.tree(rng) if rng.random() < 0.7 else furniture.sign(rng)
+            thing = plants.tree(rng) if rng.random() < 0.7 else furniture.sign(rng)
             site.put(thing, x, edge + side * rng.uniform(1.6, 6.0), np.pi)

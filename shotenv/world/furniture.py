@@ -1,4 +1,4 @@
-"""What stands along a road, on z = 0 and facing +x: posts, signs, trees, barriers, boxes."""
+"""What stands along a road, on z = 0 and facing +x: posts, signs, barriers, boxes, seats."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from shotenv.world.model import Mesh
 LAMP_HEAD_M = (0.5, 0.22)
 
 
+@meshes.thing
 def pole(rng: np.random.Generator) -> Mesh:
     """A plain mast of wood, metal or concrete."""
     finish = (m.METAL, m.WOOD, m.CONCRETE)[rng.integers(3)]
@@ -18,6 +19,7 @@ def pole(rng: np.random.Generator) -> Mesh:
     return meshes.rod((0, 0, 0), (0, 0, rng.uniform(3.0, 7.0)), radius, finish.draw(rng))
 
 
+@meshes.thing
 def lamp_post(rng: np.random.Generator, height_m: float, radiance: float = 0.0) -> Mesh:
     """A street lamp whose arm reaches 1.5 m along +x; its head glows with `radiance`."""
     metal = m.METAL.draw(rng)
@@ -39,6 +41,7 @@ def lamp_post(rng: np.random.Generator, height_m: float, radiance: float = 0.0) 
     )
 
 
+@meshes.thing
 def sign(rng: np.random.Generator) -> Mesh:
     """A traffic sign on a post: round, triangular, diamond or rectangular, retro-reflecting."""
     metal, sheet, paint = m.METAL.draw(rng), m.RETRO_SHEET.draw(rng), m.DARK_METAL.draw(rng)
@@ -60,67 +63,7 @@ def regular_polygon(sides: int, radius: float, turn: float) -> list[tuple[float,
     return [(float(radius * np.cos(a)), float(radius * np.sin(a))) for a in angles]
 
 
-def tree(rng: np.random.Generator) -> Mesh:
-    """A broad-leaved tree: trunk and a crown of lumps, or a conifer."""
-    return conifer(rng) if rng.random() < 0.25 else broadleaf(rng)
-
-
-def broadleaf(rng: np.random.Generator) -> Mesh:
-    """Trunk with two branches under a crown of irregular lumps."""
-    bark, leaves = m.BARK.draw(rng), m.FOLIAGE.draw(rng)
-    stem, radius, spread = rng.uniform(1.5, 2.8), rng.uniform(0.1, 0.28), rng.uniform(0.8, 1.6)
-    trunk = meshes.lathe([(1.4 * radius, 0.0), (radius, 0.3), (0.7 * radius, stem + 0.6)], bark)
-    branches = [
-        meshes.rod((0, 0, stem - 0.3), (spread * np.cos(a) / 2, spread * np.sin(a) / 2, stem + 0.7),
-                   0.4 * radius, bark, sections=5)
-        for a in rng.uniform(0, 2 * np.pi, 2)
-    ]  # fmt: skip
-    lumps = [
-        meshes.blob(rng, rng.uniform(0.6, 1.0) * spread, leaves, (x, y, stem + spread * (0.6 + h)))
-        for x, y, h in zip(
-            *rng.uniform(-0.7, 0.7, (2, 4)) * spread, rng.uniform(0, 1.1, 4), strict=True
-        )
-    ]
-    return meshes.join([trunk, *branches, *lumps])
-
-
-def conifer(rng: np.random.Generator) -> Mesh:
-    """A stem under stacked cones."""
-    bark, needles = m.BARK.draw(rng), m.FOLIAGE.draw(rng)
-    height, width = rng.uniform(3.5, 7.0), rng.uniform(0.9, 1.6)
-    levels = np.linspace(0.15, 0.7, 4)
-    cones = [
-        meshes.lathe(
-            [(0, z * height), (width * (1 - z), z * height), (0, (z + 0.3) * height)], needles
-        )
-        for z in levels
-    ]
-    return meshes.join([meshes.rod((0, 0, 0), (0, 0, 0.5 * height), 0.12, bark), *cones])
-
-
-def bush(rng: np.random.Generator) -> Mesh:
-    """A few leafy lumps that reach the ground."""
-    leaves = m.FOLIAGE.draw(rng)
-    radius = rng.uniform(0.3, 0.6)
-    centres = rng.uniform(-1, 1, (3, 2)) * radius
-    return meshes.join(
-        meshes.blob(rng, radius * rng.uniform(0.7, 1.1), leaves, (x, y, 0.35 * radius))
-        for x, y in centres
-    )
-
-
-def hedge(rng: np.random.Generator, length_m: float) -> Mesh:
-    """A clipped hedge along y: overlapping lumps around a box."""
-    leaves, height = m.FOLIAGE.draw(rng), rng.uniform(0.8, 1.6)
-    lumps = [
-        meshes.blob(rng, 0.45, leaves, (0.1, y, height * h), detail=1)
-        for y, h in zip(
-            np.arange(-length_m / 2, length_m / 2, 0.8), rng.uniform(0.3, 0.8, 99), strict=False
-        )
-    ]
-    return meshes.join([meshes.box((0.7, length_m, height), leaves), *lumps])
-
-
+@meshes.thing
 def bollard(rng: np.random.Generator) -> Mesh:
     """A short post with a retro-reflecting ring."""
     height, radius = rng.uniform(0.7, 1.05), rng.uniform(0.05, 0.11)
@@ -138,6 +81,7 @@ def bollard(rng: np.random.Generator) -> Mesh:
     )
 
 
+@meshes.thing
 def cone(rng: np.random.Generator) -> Mesh:
     """A traffic cone."""
     rubber, sheet = m.CLOTHES.draw(rng), m.RETRO_SHEET.draw(rng)
@@ -150,6 +94,7 @@ def cone(rng: np.random.Generator) -> Mesh:
     )
 
 
+@meshes.thing
 def crate(rng: np.random.Generator) -> Mesh:
     """A box or a small stack of boxes."""
     finishes = (m.CARDBOARD, m.WOOD, m.METAL, m.DARK_METAL)
@@ -159,6 +104,7 @@ def crate(rng: np.random.Generator) -> Mesh:
     return meshes.join([lower, upper]) if rng.random() < 0.4 else lower
 
 
+@meshes.thing
 def rubbish_bin(rng: np.random.Generator) -> Mesh:
     """A wheeled rubbish bin with its lid."""
     body, lid = m.DARK_CLOTHES.draw(rng), m.DARK_METAL.draw(rng)
@@ -167,6 +113,7 @@ def rubbish_bin(rng: np.random.Generator) -> Mesh:
     return meshes.join([meshes.extrude(slope, 0.55, body), cover])
 
 
+@meshes.thing
 def guard_rail(rng: np.random.Generator, length_m: float) -> Mesh:
     """A steel beam on posts, along y."""
     metal = m.METAL.draw(rng)
@@ -180,6 +127,7 @@ def guard_rail(rng: np.random.Generator, length_m: float) -> Mesh:
     )
 
 
+@meshes.thing
 def jersey_barrier(rng: np.random.Generator, length_m: float) -> Mesh:
     """A concrete barrier with the usual sloped foot, along y."""
     concrete = m.CONCRETE.draw(rng)
@@ -192,6 +140,7 @@ def jersey_barrier(rng: np.random.Generator, length_m: float) -> Mesh:
     return meshes.join([foot, stem])
 
 
+@meshes.thing
 def fence(rng: np.random.Generator, length_m: float) -> Mesh:
     """Upright boards with gaps on two rails, along y."""
     wood, height = m.WOOD.draw(rng), rng.uniform(0.9, 1.5)
@@ -203,3 +152,83 @@ def fence(rng: np.random.Generator, length_m: float) -> Mesh:
         meshes.box((0.05, length_m, 0.08), wood, (-0.045, 0.0, h * height)) for h in (0.25, 0.75)
     ]
     return meshes.join([*boards, *rails])
+
+
+@meshes.thing
+def delineator(rng: np.random.Generator) -> Mesh:
+    """A roadside marker post with retro-reflectors on both faces."""
+    glint, side = m.RETRO_SHEET.draw(rng), 0.062
+    return meshes.join(
+        [
+            meshes.box((0.12, 0.12, 1.0), m.WHITE_PAINT.draw(rng)),
+            meshes.box((0.124, 0.124, 0.25), m.RUBBER.draw(rng), (0.0, 0.0, 0.62)),
+            meshes.front((-0.04, 0.04), (0.68, 0.84), side + 0.008, glint),
+            meshes.back((-0.04, 0.04), (0.68, 0.84), -side - 0.008, glint),
+        ]
+    )
+
+
+@meshes.thing
+def chevron_board(rng: np.random.Generator) -> Mesh:
+    """A board of retro-reflecting and dark bars at a bend, on two posts."""
+    sheet, dark, metal = m.RETRO_SHEET.draw(rng), m.RUBBER.draw(rng), m.METAL.draw(rng)
+    bars = [
+        meshes.front((y, y + 0.25), (0.9, 1.4), 0.05, sheet if i % 2 else dark)
+        for i, y in enumerate(np.arange(-0.75, 0.74, 0.25))
+    ]
+    posts = [meshes.rod((0, y, 0), (0, y, 1.45), 0.035, metal, sections=6) for y in (-0.5, 0.5)]
+    rear = meshes.back((-0.75, 0.75), (0.9, 1.4), 0.04, metal)
+    return meshes.join([*bars, *posts, rear])
+
+
+@meshes.thing
+def bench(rng: np.random.Generator) -> Mesh:
+    """A seat of planks on two feet, with a back rest."""
+    wood, foot = m.WOOD.draw(rng), m.CONCRETE.draw(rng)
+    planks = [(x, 0.44) for x in (-0.05, 0.1, 0.25)]
+    return meshes.join(
+        [
+            *(meshes.box((0.12, 1.7, 0.04), wood, (x, 0.0, z)) for x, z in planks),
+            *(meshes.box((0.04, 1.7, 0.12), wood, (-0.17, 0.0, z)) for z in (0.58, 0.76)),
+            *(meshes.box((0.4, 0.1, 0.44), foot, (0.08, y, 0.0)) for y in (-0.65, 0.65)),
+            *(meshes.box((0.06, 0.06, 0.9), foot, (-0.2, y, 0.0)) for y in (-0.65, 0.65)),
+        ]
+    )
+
+
+@meshes.thing
+def cabinet(rng: np.random.Generator) -> Mesh:
+    """A switching cabinet on a plinth, with two doors."""
+    height, finish = rng.uniform(0.9, 1.5), (m.PLASTIC, m.METAL, m.CONCRETE)[rng.integers(3)]
+    body, gap = finish.draw(rng), m.DARK_METAL.draw(rng)
+    return meshes.join(
+        [
+            meshes.box((0.4, 1.1, 0.12), m.CONCRETE.draw(rng)),
+            meshes.box((0.36, 1.06, height), body, (0.0, 0.0, 0.12)),
+            meshes.front((-0.01, 0.01), (0.16, height), 0.185, gap),
+        ]
+    )
+
+
+@meshes.thing
+def letter_box(rng: np.random.Generator) -> Mesh:
+    """A letter box on a post."""
+    paint = m.COLOUR_CAR_PAINT.draw(rng)
+    return meshes.join(
+        [
+            meshes.rod((0, 0, 0), (0, 0, 0.9), 0.04, m.METAL.draw(rng), sections=6),
+            meshes.box((0.3, 0.45, 0.6), paint, (0.0, 0.0, 0.8)),
+            meshes.front((-0.15, 0.15), (1.22, 1.26), 0.158, m.RUBBER.draw(rng)),
+        ]
+    )
+
+
+@meshes.thing
+def planter(rng: np.random.Generator) -> Mesh:
+    """A tub of concrete or wood with a bushy plant in it."""
+    finish, width = (m.CONCRETE, m.WOOD)[rng.integers(2)].draw(rng), rng.uniform(0.6, 1.1)
+    leaves = [
+        meshes.blob(rng, rng.uniform(0.2, 0.35), m.FOLIAGE.draw(rng), (x, y, 0.65))
+        for x, y in rng.uniform(-0.25, 0.25, (2, 2)) * width
+    ]
+    return meshes.join([meshes.box((width, width, 0.5), finish), *leaves])

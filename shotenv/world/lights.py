@@ -14,6 +14,10 @@ from shotenv.world.model import Lamp, Light
 
 G173_IRRADIANCE = 11.6
 G173_AIR_MASS = 1.5
+LOW_SUN_RAD = np.radians(15.0)
+"""Elevation below which the sun counts as low."""
+DUSK_RADIANCE = 5e-3
+"""Radiance of the sky below which lamps are lit, W m-2 sr-1."""
 BRIGHTEST_FACE = 2.0
 """Radiance at which lamp faces are capped, W m-2 sr-1: about a white wall in the sun."""
 
@@ -21,9 +25,11 @@ BRIGHTEST_FACE = 2.0
 def sun_irradiance(elevation_rad: float) -> float:
     """Direct sun in band on a surface that faces it, clear air, W m-2; at most G173's.
 
-    Transmission 0.7 ** (air mass ** 0.678) (Meinel and Meinel, 1976), relative to air mass 1.5.
+    Transmission 0.7 ** (air mass ** 0.678) (Meinel and Meinel, 1976), relative to air mass 1.5;
+    air mass by Kasten and Young (1989), which holds down to the horizon.
     """
-    air_mass = 1.0 / np.sin(elevation_rad)
+    degrees = np.degrees(elevation_rad)
+    air_mass = 1.0 / (np.sin(elevation_rad) + 0.50572 * (degrees + 6.07995) ** -1.6364)
     relative = 0.7 ** (air_mass**0.678 - G173_AIR_MASS**0.678)
     return float(G173_IRRADIANCE * min(1.0, relative))
 
@@ -38,8 +44,26 @@ def direction(azimuth_rad: float, elevation_rad: float) -> tuple[float, float, f
     )
 
 
-def sunny(rng: np.random.Generator) -> Light:
-    """Sun at 15 to 60 degrees, more or less haze, and a blue sky, brighter at the horizon."""
+def sunny(rng: np.random.Generator, low_share: float = 0.3) -> Light:
+    """Sun and a blue sky; the sun is low with probability `low_share`."""
+    return low_sun(rng) if rng.random() < low_share else high_sun(rng)
+
+
+def low_sun(rng: np.random.Generator) -> Light:
+    """Sun at 2.5 to 15 degrees: long shadows; the sky is darker overhead, bright at the horizon."""
+    elevation, haze = np.radians(rng.uniform(2.5, 15.0)), rng.uniform(0.0, 0.35)
+    zenith = rng.uniform(0.12, 0.3)
+    return Light(
+        sun_irradiance=sun_irradiance(elevation) * (1.0 - haze),
+        sun_direction=direction(rng.uniform(-np.pi, np.pi), elevation),
+        sky_zenith=zenith,
+        sky_horizon=zenith * rng.uniform(1.4, 2.2),
+        lamps=(),
+    )
+
+
+def high_sun(rng: np.random.Generator) -> Light:
+    """Sun at 15 to 60 degrees, more or less haze, and a sky that is brighter at the horizon."""
     elevation, haze = np.radians(rng.uniform(15.0, 60.0)), rng.uniform(0.0, 0.35)
     zenith = rng.uniform(0.3, 0.45)
     return Light(
@@ -62,6 +86,11 @@ def night(rng: np.random.Generator) -> Light:
     sky = log_uniform(rng, (3e-5, 3e-4))
     lamps = ego_headlights(rng) if rng.random() < 0.75 else ()
     return Light(0.0, (0.0, 0.0, 1.0), sky, 1.5 * sky, lamps)
+
+
+def is_dark(light: Light) -> bool:
+    """Whether the sky is so dark that streets, windows and vehicles have their lamps on."""
+    return light.sky_zenith < DUSK_RADIANCE
 
 
 def ego_headlights(rng: np.random.Generator) -> tuple[Lamp, ...]:

@@ -2,8 +2,10 @@
 
 Albedo ranges are in band (940 nm). Asphalt, concrete, soil, foliage, skin, clothes, white paint,
 black car paint, tyres and retro-reflectors are the values of the project's physics notes; grass,
-bark, plaster, brick, metal, glass and coloured paint are assumed from the same kind of tables
-(dyes and most colour pigments are bright in the near infrared). None is calibrated.
+bark, plaster, brick, metal, glass, coloured paint and the rest are assumed from the same kind of
+tables (dyes and most colour pigments are bright in the near infrared). Mirrored shares are assumed
+too: of the order of Fresnel reflection, larger where things are mostly seen at a grazing angle.
+None is calibrated.
 """
 
 from __future__ import annotations
@@ -76,12 +78,16 @@ class Finish:
         Length after which the texture repeats, metres.
     retro : (low, high)
         Retro-reflection, drawn log-uniformly; (0, 0) for none.
+    mirror, clear : (low, high)
+        Shares of the light that are mirrored and that pass straight through.
     """
 
     albedo: Range
     contrast: float
     texture_m: float
     retro: Range = (0.0, 0.0)
+    mirror: Range = (0.0, 0.0)
+    clear: Range = (0.0, 0.0)
 
     def draw(self, rng: np.random.Generator) -> Material:
         """Material of one object."""
@@ -94,6 +100,8 @@ class Finish:
             texture_m=self.texture_m * rng.uniform(0.8, 1.25),
             offset=rng.uniform(),
             retro=retro,
+            mirror=rng.uniform(*self.mirror),
+            clear=rng.uniform(*self.clear),
         )
 
 
@@ -116,12 +124,23 @@ DARK_CLOTHES = Finish((0.08, 0.35), 0.25, 0.5)
 LEATHER = Finish((0.05, 0.20), 0.20, 0.3)
 WHITE_PAINT = Finish((0.70, 0.85), 0.10, 1.0)
 ROAD_PAINT = Finish((0.55, 0.80), 0.25, 0.8, retro=(2.0, 10.0))
-BLACK_CAR_PAINT = Finish((0.03, 0.08), 0.10, 2.0)
-COLOUR_CAR_PAINT = Finish((0.15, 0.60), 0.08, 2.0)
-WHITE_CAR_PAINT = Finish((0.65, 0.80), 0.05, 2.0)
+BLACK_CAR_PAINT = Finish((0.03, 0.08), 0.10, 2.0, mirror=(0.04, 0.08))
+COLOUR_CAR_PAINT = Finish((0.15, 0.60), 0.08, 2.0, mirror=(0.04, 0.08))
+WHITE_CAR_PAINT = Finish((0.65, 0.80), 0.05, 2.0, mirror=(0.04, 0.08))
 TYRE = Finish((0.03, 0.05), 0.20, 0.3)
 RUBBER = Finish((0.04, 0.08), 0.20, 0.5)
-GLASS = Finish((0.02, 0.06), 0.30, 3.0)
+GLASS = Finish((0.02, 0.06), 0.30, 3.0, mirror=(0.06, 0.15))
+CLEAR_GLASS = Finish((0.02, 0.10), 0.30, 3.0, mirror=(0.06, 0.12), clear=(0.65, 0.85))
+TINTED_GLASS = Finish((0.02, 0.06), 0.30, 3.0, mirror=(0.06, 0.12), clear=(0.15, 0.60))
+WATER = Finish((0.04, 0.10), 0.30, 2.0, mirror=(0.30, 0.60))
+COATED_FLOOR = Finish((0.25, 0.45), 0.15, 3.0, mirror=(0.02, 0.10))
+SNOW = Finish((0.80, 0.90), 0.06, 1.5)
+UPHOLSTERY = Finish((0.10, 0.45), 0.20, 0.5)
+GRAVEL = Finish((0.20, 0.40), 0.50, 0.4)
+ROCK = Finish((0.20, 0.40), 0.40, 0.7)
+LEAF_LITTER = Finish((0.25, 0.45), 0.55, 0.6)
+PLASTIC = Finish((0.15, 0.70), 0.08, 1.0, mirror=(0.02, 0.04))
+MACHINE_PAINT = Finish((0.35, 0.65), 0.15, 1.0, mirror=(0.02, 0.05))
 METAL = Finish((0.30, 0.60), 0.15, 0.8)
 DARK_METAL = Finish((0.08, 0.20), 0.20, 0.8)
 BRICK = Finish((0.30, 0.50), 0.30, 0.9)

@@ -6,9 +6,10 @@ below them. Texture coordinates are projected along the axis nearest to each fac
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields, replace
-from functools import cache
+from functools import cache, wraps
+from typing import ParamSpec
 
 import numpy as np
 import trimesh
@@ -16,6 +17,7 @@ import trimesh
 from shotenv.world.materials import Material
 from shotenv.world.model import Mesh, Pose
 
+P = ParamSpec("P")
 Point = tuple[float, float, float]
 ORIGIN: Point = (0.0, 0.0, 0.0)
 _NEXT, _AFTER = [1, 2, 0], [2, 0, 1]
@@ -59,12 +61,22 @@ def area_vectors(corners: np.ndarray) -> np.ndarray:
 def join(meshes: Iterable[Mesh]) -> Mesh:
     """One mesh of all the faces."""
     parts = list(meshes)
+    arrays = [field.name for field in fields(Mesh) if field.name != "kinds"]
     return Mesh(
-        **{
-            field.name: np.concatenate([getattr(part, field.name) for part in parts])
-            for field in fields(Mesh)
-        }
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in arrays},
+        kinds=frozenset().union(*(part.kinds for part in parts)),
     )
+
+
+def thing(draw: Callable[P, Mesh]) -> Callable[P, Mesh]:
+    """Mark what `draw` makes as a thing of the kind that the function is named after."""
+
+    @wraps(draw)
+    def drawn(*args: P.args, **kwargs: P.kwargs) -> Mesh:
+        mesh = draw(*args, **kwargs)
+        return replace(mesh, kinds=mesh.kinds | {draw.__name__})
+
+    return drawn
 
 
 def place(mesh: Mesh, pose: Pose) -> Mesh:
@@ -80,9 +92,23 @@ def at(mesh: Mesh, x: float, y: float, z: float = 0.0, yaw: float = 0.0) -> Mesh
     return place(mesh, Pose((x, y, z), yaw))
 
 
+def grounded(mesh: Mesh) -> Mesh:
+    """`mesh` raised or lowered until its lowest corner is at z = 0."""
+    return at(mesh, 0.0, 0.0, -float(mesh.corners[..., 2].min()))
+
+
 def scaled(mesh: Mesh, factors: Point) -> Mesh:
     """`mesh` stretched along each axis."""
     return replace(mesh, corners=mesh.corners * np.asarray(factors, dtype=np.float32))
+
+
+def frame(outline: Sequence[Point], pane: Sequence[Point] | np.ndarray, material: Material) -> Mesh:
+    """What is left of a polygon around a pane cut out of it, both with as many corners."""
+    outer, inner = list(outline), list(pane)
+    return join(
+        polygon([outer[i - 1], outer[i], inner[i], inner[i - 1]], material)
+        for i in range(len(outer))
+    )
 
 
 def polygon(points: Sequence[Point] | np.ndarray, material: Material) -> Mesh:

@@ -35,6 +35,8 @@ class Mesh:
     clear : float32 [F]
         Share of the light that passes straight through, as through a thin pane; 0 for most.
         The rest, 1 - mirror - clear, meets the diffuse surface below.
+    kinds : frozenset of str
+        Names of the kinds of things that the faces belong to.
     """
 
     corners: np.ndarray
@@ -45,6 +47,7 @@ class Mesh:
     emission: np.ndarray
     mirror: np.ndarray
     clear: np.ndarray
+    kinds: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -92,7 +95,9 @@ class Lamp:
 
     Irradiance at distance d in direction w: intensity * falloff(angle) / (d^2 + radius_m^2); the
     radius keeps it finite close by. `cutoff_cos` = -1 shines everywhere; otherwise the intensity
-    falls smoothly to 0 at that cosine from `direction`. `rides` lamps move with the camera.
+    falls smoothly to 0 at that cosine from `direction`. `rides` lamps move with the camera. A lamp
+    with a `carrier` is fixed to that one of `World.moving`, in whose own coordinates its position
+    and direction are.
     """
 
     position_m: tuple[float, float, float]
@@ -101,6 +106,7 @@ class Lamp:
     direction: tuple[float, float, float] = (0.0, 0.0, -1.0)
     cutoff_cos: float = -1.0
     rides: bool = False
+    carrier: int | None = None
 
 
 @dataclass(frozen=True)
@@ -162,3 +168,8 @@ class World:
     light: Light
     ego: Motion
     """Path of the camera, its height in z, looking along +x of its own heading."""
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Names of the kinds of things in this world, still or moving."""
+        return self.static.kinds.union(*(thing.mesh.kinds for thing in self.moving))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shotenv.world import buildings, furniture, meshes, vehicles
+from shotenv.config import Range
+from shotenv.world import buildings, furniture, meshes, plants, shelters, vehicles
 from shotenv.world import materials as m
 from shotenv.world.model import Mesh
 from shotenv.world.site import Site
@@ -21,9 +22,11 @@ from shotenv.world.traffic import (
 )
 
 BEHIND_M = 60.0
+SHOP_RADIANCE = (2e-3, 5e-2)
 REACH_M = 120.0
 KERB_M = 0.12
 PAINT_M = 0.008
+PUDDLE_M = 0.013
 
 
 def country_road(site: Site, rng: np.random.Generator) -> None:
@@ -49,7 +52,7 @@ def country_road(site: Site, rng: np.random.Generator) -> None:
     street_lamps(site, rng, right - 1.2, rng.uniform(18, 30))
     row(site, rng, roadside_thing, right - 1.3, 3.5, np.pi, share=0.75, spread=2.0)
     row(site, rng, roadside_thing, left + 1.3, 4.5, 0.0, share=0.7, spread=3.0)
-    row(site, rng, furniture.tree, right - 6.0, 9.0, 0.0, share=0.5, spread=3.0)
+    row(site, rng, plants.tree, right - 6.0, 9.0, 0.0, share=0.5, spread=3.0)
 
 
 def town_street(site: Site, rng: np.random.Generator) -> None:
@@ -71,9 +74,25 @@ def town_street(site: Site, rng: np.random.Generator) -> None:
     walkers(site, rng, (1, 4), (right - pavement + 0.5, right - 0.5), KERB_M)
     walkers(site, rng, (0, 3), (left + 0.5, left + pavement - 0.5), KERB_M)
     cyclists(site, rng, -lane / 2 - 0.1)
-    row(site, rng, vehicles.car, right + parking / 2 + 0.05, 5.8, 0.0, share=rng.uniform(0.3, 0.9))
+    row(
+        site,
+        rng,
+        vehicles.parked_car,
+        right + parking / 2 + 0.05,
+        5.8,
+        0.0,
+        share=rng.uniform(0.3, 0.9),
+    )
     if parking_left == parking:
-        row(site, rng, vehicles.car, left - parking / 2, 6.0, np.pi, share=rng.uniform(0.2, 0.8))
+        row(
+            site,
+            rng,
+            vehicles.parked_car,
+            left - parking / 2,
+            6.0,
+            np.pi,
+            share=rng.uniform(0.2, 0.8),
+        )
     street_lamps(site, rng, right - 0.5, rng.uniform(13, 20), KERB_M)
     row(site, rng, pavement_thing, right - 0.5, 2.6, np.pi, KERB_M, share=0.6)
     row(site, rng, pavement_thing, left + 0.5, 3.5, 0.0, KERB_M, share=0.5)
@@ -86,6 +105,7 @@ def car_park(site: Site, rng: np.random.Generator) -> None:
     site.build(meshes.patch((-BEHIND_M, far), (-REACH_M, REACH_M), 0.0, ground))
     end = site.travel_m + 0.7 + 5.0 * rng.uniform() ** 1.5
     bays(site, rng, end, rng.uniform(2.5, 2.9))
+    puddles(site, rng, (-5.0, 5.0))
     ahead = rng.random()
     if ahead < 0.35:
         car, facing = vehicles.car(rng), np.pi if rng.random() < 0.5 else 0.0
@@ -97,7 +117,9 @@ def car_park(site: Site, rng: np.random.Generator) -> None:
     for x in np.arange(end - 3.0, end + 12.0, 5.5):
         for y in (-5.4, -2.7, 2.7, 5.4):
             if rng.random() < 0.5:
-                site.put(vehicles.car(rng), x, y + rng.uniform(-0.2, 0.2), rng.integers(2) * np.pi)
+                site.put(
+                    vehicles.parked_car(rng), x, y + rng.uniform(-0.2, 0.2), rng.integers(2) * np.pi
+                )
     crossing(site, rng, (-4.0, 4.0), near=0.9)
     walkers(site, rng, (1, 4), (-6.0, 6.0))
     row(site, rng, pavement_thing, 0.0, 2.5, 0.0, share=0.5, spread=5.0)
@@ -128,6 +150,7 @@ def carriageway(
             site.build(meshes.patch((start, start + 3.5), (y, y + 0.5), PAINT_M + 0.002, paint))
     if rng.random() < 0.5:
         patches(site, rng, right, left)
+    puddles(site, rng, (right, left))
 
 
 def patches(site: Site, rng: np.random.Generator, right: float, left: float) -> None:
@@ -143,6 +166,17 @@ def patches(site: Site, rng: np.random.Generator, right: float, left: float) -> 
             outline = furniture.regular_polygon(10, 0.33, 0.0)
             disc = [(x + u, y + v, height) for u, v in outline]
             site.build(meshes.polygon(disc, m.DARK_METAL.draw(rng)))
+
+
+def puddles(site: Site, rng: np.random.Generator, y: Range) -> None:
+    """Water that stands on wet ground between `y`: the more, the wetter."""
+    for _ in range(rng.integers(4, 12) if site.weather.wetness else 0):
+        length, half = rng.uniform(0.4, 2.5), rng.uniform(0.2, 0.8) * site.weather.wetness
+        x = site.travel_m * rng.uniform() + rng.uniform(2.0, 16.0)
+        middle, turn = rng.uniform(y[0] + half, y[1] - half), rng.uniform(0, 2 * np.pi)
+        outline = furniture.regular_polygon(9, 1.0, turn)
+        disc = [(x + length * u, middle + half * v, PUDDLE_M) for u, v in outline]
+        site.build(meshes.polygon(disc, m.WATER.draw(rng)))
 
 
 def side_walk(
@@ -167,7 +201,10 @@ def facades(site: Site, rng: np.random.Generator, y: float, yaw: float) -> None:
     while x < site.travel_m + 32.0:
         length, kind = rng.uniform(6.0, 12.0), rng.random()
         centre = x + length / 2
-        if kind < 0.65:
+        if kind < 0.25:
+            glow = m.log_uniform(rng, SHOP_RADIANCE) if site.night and rng.random() < 0.6 else 0.0
+            site.put(shelters.shop_front(rng, length, glow), centre, y, yaw, KERB_M)
+        elif kind < 0.65:
             site.put(buildings.facade(rng, length, site.night), centre, y, yaw, KERB_M)
         elif kind < 0.9:
             site.put(hedge_or_wall(rng, length), centre, y, yaw, KERB_M)
@@ -176,20 +213,24 @@ def facades(site: Site, rng: np.random.Generator, y: float, yaw: float) -> None:
 
 def backdrop(rng: np.random.Generator) -> Mesh:
     """What a parking bay ends at: wall, facade, garage door, hedge or fence."""
-    length, kind = rng.uniform(6.0, 14.0), rng.integers(5)
+    length, kind = rng.uniform(6.0, 14.0), rng.integers(7)
     if kind == 0:
         return buildings.facade(rng, length)
     if kind == 1:
         return buildings.roller_door(rng)
     if kind == 2:
         return furniture.fence(rng, length)
+    if kind == 3:
+        return shelters.glass_railing(rng, length)
+    if kind == 4:
+        return shelters.shop_front(rng, length)
     return hedge_or_wall(rng, length)
 
 
 def hedge_or_wall(rng: np.random.Generator, length_m: float) -> Mesh:
     """Either, with its front facing +x."""
     if rng.random() < 0.35:
-        return furniture.hedge(rng, length_m)
+        return plants.hedge(rng, length_m)
     return buildings.wall(rng, length_m, rng.uniform(0.8, 2.6))
 
 

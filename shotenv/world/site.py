@@ -23,6 +23,7 @@ from shotenv.world.model import (
     Pose,
     World,
 )
+from shotenv.world.weather import DRY, Weather, weathered
 
 STEP_S = 0.04
 MAX_INSTANTS = 500
@@ -46,12 +47,15 @@ class Site:
         Length of the clip.
     night : bool
         Lamps of streets, windows and cars are on.
+    weather : Weather
+        What rain and snow have done to everything that stands still.
     """
 
-    def __init__(self, ego: Motion, duration_s: float, night: bool = False):
+    def __init__(self, ego: Motion, duration_s: float, night: bool = False, weather: Weather = DRY):
         self.ego = ego
         self.duration_s = duration_s
         self.night = night
+        self.weather = weather
         instants = int(np.clip(np.ceil(duration_s / STEP_S), 2, MAX_INSTANTS))
         self.times = np.linspace(0.0, duration_s, instants)
         self.static: list[Mesh] = []
@@ -75,6 +79,11 @@ class Site:
     def build(self, mesh: Mesh) -> None:
         """Add ground, ceilings and other things that nothing can run into."""
         self._triangles += len(mesh.corners)
+        self.static.append(weathered(mesh, self.weather))
+
+    def shelter(self, mesh: Mesh) -> None:
+        """Add ground that rain and snow have left as it is, such as the track of many wheels."""
+        self._triangles += len(mesh.corners)
         self.static.append(mesh)
 
     def put(self, mesh: Mesh, x: float, y: float, yaw: float = 0.0, z: float = 0.0) -> bool:
@@ -82,11 +91,12 @@ class Site:
         pose = Pose((x, y, z), yaw)
         free = self._claim(mesh, [pose])
         if free:
-            self.static.append(meshes.place(mesh, pose))
+            self.static.append(weathered(meshes.place(mesh, pose), self.weather))
         return free
 
     def move(self, mesh: Mesh, motion: Motion) -> bool:
-        """Add a thing that moves; false if its way is not free."""
+        """Add a thing that moves on its lowest point; false if its way is not free."""
+        mesh = meshes.grounded(mesh)
         free = self._claim(mesh, [motion.at(time) for time in self.times])
         if free:
             self.moving.append(MovingObject(mesh, motion))
@@ -94,13 +104,17 @@ class Site:
 
     def world(self, family: Family, seed: int, light: Light) -> World:
         """The finished world; the nearest lamps are kept if there are too many."""
-        ahead = np.array([self.travel_m / 2 + 4.0, 0.0, 0.0])
-        lamps = (*light.lamps, *self.lamps)
-        nearest = sorted(
-            lamps, key=lambda lamp: (not lamp.rides, np.linalg.norm(lamp.position_m - ahead))
-        )
+        nearest = sorted((*light.lamps, *self.lamps), key=self._lamp_order)
         light = replace(light, lamps=tuple(nearest[:MAX_LAMPS]), indoor=self.indoor)
         return World(family, seed, meshes.join(self.static), tuple(self.moving), light, self.ego)
+
+    def _lamp_order(self, lamp: Lamp) -> tuple[bool, float]:
+        """Lamps that ride with the camera first, then by distance halfway through the clip."""
+        place = lamp.position_m
+        if lamp.carrier is not None:
+            place = self.moving[lamp.carrier].motion.at(self.duration_s / 2).position_m
+        away = np.subtract(place, (self.travel_m / 2 + 4.0, 0.0, 0.0))
+        return not lamp.rides, float(np.linalg.norm(away))
 
     def _claim(self, mesh: Mesh, poses: list[Pose]) -> bool:
         taken = footprints(mesh, poses)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from shotenv.config import Range
-from shotenv.world import furniture, lights, people, vehicles
+from shotenv.world import cycles, furniture, lights, people, plants, shelters, vehicles
 from shotenv.world import materials as m
 from shotenv.world.model import Lamp, Mesh, Motion, Pose
 from shotenv.world.site import Site
@@ -17,17 +17,39 @@ HEADLAMP_W_SR = (0.05, 1.0)
 TAIL_RADIANCE = (0.02, 0.2)
 STREET_IRRADIANCE = (1e-3, 2e-2)
 TRIES = 4
+DrawPasser = Callable[[np.random.Generator, float], tuple[Mesh, float]]
+"""Draws a mesh and its speed in m/s, given how wet it is."""
+
+
+def passer_by(rng: np.random.Generator, wetness: float) -> tuple[Mesh, float]:
+    """Somebody along a road, on foot or on a kick scooter, and their speed in m/s."""
+    speed = rng.uniform(0.7, 1.8) if rng.random() < 0.75 else 0.0
+    if speed and rng.random() < 0.06:
+        return cycles.kick_scooter(rng), 2.0 * speed
+    return people.somebody(rng, speed, wetness), speed
+
+
+def crosser(rng: np.random.Generator, wetness: float) -> tuple[Mesh, float]:
+    """Somebody who crosses a road, on foot or on a bicycle, and their speed in m/s."""
+    if rng.random() < 0.2:
+        return cycles.cyclist(rng), rng.uniform(2.0, 5.0)
+    speed = rng.uniform(0.7, 1.8)
+    return people.somebody(rng, speed, wetness), speed
 
 
 def walkers(
-    site: Site, rng: np.random.Generator, count: tuple[int, int], y: Range, z: float = 0.0
+    site: Site,
+    rng: np.random.Generator,
+    count: tuple[int, int],
+    y: Range,
+    z: float = 0.0,
+    draw: DrawPasser = passer_by,
 ) -> None:
-    """People who stand or walk along the road, either way: at least count[0], below count[1]."""
+    """People who stand or move along the road, either way: at least count[0], below count[1]."""
     near = site.travel_m + 0.9
     far = max(near, min(near + 17.0, site.room[1, 0] - 0.5))
     for _ in range(rng.integers(*count)):
-        speed = rng.uniform(0.7, 1.8) if rng.random() < 0.75 else 0.0
-        somebody = people.person(rng, 0.4 * speed)
+        somebody, speed = draw(rng, site.weather.wetness)
         for _ in range(TRIES):
             yaw = rng.integers(2) * np.pi + rng.uniform(-0.05, 0.05)
             place = (rng.uniform(near, far), rng.uniform(*y), z)
@@ -35,12 +57,19 @@ def walkers(
                 break
 
 
-def crossing(site: Site, rng: np.random.Generator, y: Range, near: float = 1.5) -> None:
-    """Up to two people who cross in front of the ego and stay between `y` during the clip."""
+def crossing(
+    site: Site,
+    rng: np.random.Generator,
+    y: Range,
+    near: float = 1.5,
+    draw: DrawPasser = crosser,
+) -> None:
+    """Up to two who cross in front of the ego and stay between `y` during the clip."""
     span = min(7.0, site.room[1, 0] - site.travel_m - near - 0.5)
     for _ in range(rng.integers(0, 3)):
-        speed = min(rng.uniform(0.7, 1.8), (y[1] - y[0]) / site.duration_s)
-        somebody, room = people.person(rng, 0.4 * speed), y[1] - y[0] - speed * site.duration_s
+        somebody, wish = draw(rng, site.weather.wetness)
+        speed = min(wish, (y[1] - y[0]) / site.duration_s)
+        room = y[1] - y[0] - speed * site.duration_s
         for _ in range(TRIES):
             start, side = y[0] + rng.uniform() * room, rng.choice([-1.0, 1.0])
             across = start if side > 0 else y[0] + y[1] - start
@@ -51,48 +80,56 @@ def crossing(site: Site, rng: np.random.Generator, y: Range, near: float = 1.5) 
 
 
 def lead(site: Site, rng: np.random.Generator) -> None:
-    """Perhaps a car ahead in the ego's lane: close behind it in a queue, further off when fast."""
+    """Perhaps a vehicle ahead in the ego's lane: close in a queue, further off when fast."""
     if rng.random() < 0.4:
         return
     speed = site.ego.speed_m_s * rng.uniform(0.8, 1.15)
-    # The car's own half length comes on top of the gap; braking shortens the gap during the clip.
+    # Braking shortens the gap during the clip.
     gap = 0.6 + rng.uniform(0.0, 3.5) + 0.8 * site.ego.speed_m_s * rng.uniform(0.3, 1.2)
     tail = m.log_uniform(rng, TAIL_RADIANCE) if site.night else 0.0
-    vehicle = vehicles.cyclist(rng) if rng.random() < 0.12 else vehicles.car(rng, 0.0, tail)
-    start = Pose((gap + 2.6, rng.uniform(-0.3, 0.3), 0.0))
+    vehicle = cycles.cyclist(rng) if rng.random() < 0.12 else vehicles.traffic(rng, 0.0, tail)
+    rear = float(vehicle.corners[..., 0].min())
+    start = Pose((gap + 0.4 - rear, rng.uniform(-0.3, 0.3), 0.0))
     site.move(vehicle, Motion(start, speed))
 
 
 def oncoming(site: Site, rng: np.random.Generator, lane: float) -> None:
-    """Up to two cars in the other lane, coming closer or standing in a queue."""
+    """Up to two vehicles in the other lane, coming closer or standing in a queue."""
     for _ in range(rng.integers(0, 3)):
         speed = rng.uniform(3.0, 14.0) if rng.random() < 0.75 else 0.0
         x, y = rng.uniform(5.0, 28.0) + 0.5 * site.travel_m, lane + rng.uniform(-0.2, 0.3)
-        approaching_car(site, rng, Motion(Pose((x, y, 0.0), np.pi), speed))
+        approaching(site, rng, Motion(Pose((x, y, 0.0), np.pi), speed))
 
 
-def approaching_car(site: Site, rng: np.random.Generator, motion: Motion) -> None:
-    """A car seen from the front, at night with its head lights on.
+def approaching(
+    site: Site,
+    rng: np.random.Generator,
+    motion: Motion,
+    draw: Callable[[np.random.Generator, float], Mesh] = vehicles.traffic,
+) -> None:
+    """A vehicle seen from the front, in the dark with its head lights on."""
+    lit = site.night or site.indoor is not None
+    intensity = m.log_uniform(rng, HEADLAMP_W_SR) if lit else 0.0
+    mesh = draw(rng, lights.face_radiance(intensity, HEADLAMP_M2))
+    if site.move(mesh, motion) and intensity:
+        site.lamps += head_lights(mesh, intensity, carrier=len(site.moving) - 1)
 
-    Only a standing car's head lights light other things, because a `Lamp` cannot follow a car.
-    """
-    intensity = m.log_uniform(rng, HEADLAMP_W_SR) if site.night else 0.0
-    mesh = vehicles.car(rng, lights.face_radiance(intensity, HEADLAMP_M2), 0.0)
-    if not site.move(mesh, motion) or not intensity or motion.speed_m_s:
-        return
-    x, y, _ = motion.start.position_m
-    nose, ahead = float(mesh.corners[..., 0].max()) + 0.15, lights.direction(np.pi, -0.03)
-    for side in (-0.6, 0.6):
-        site.lamps.append(
-            Lamp((x - nose, y + side, 0.7), intensity, 0.1, ahead, float(np.cos(0.5)))
-        )
+
+def head_lights(mesh: Mesh, intensity_w_sr: float, carrier: int) -> list[Lamp]:
+    """Head lights of a vehicle, which they move with: two, or one on what is narrow."""
+    nose, half = float(mesh.corners[..., 0].max()) + 0.15, float(mesh.corners[..., 1].max())
+    sides = (0.0,) if half < 0.6 else (0.3 - half, half - 0.3)
+    ahead, cutoff = lights.direction(0.0, -0.03), float(np.cos(0.5))
+    return [
+        Lamp((nose, y, 0.75), intensity_w_sr, 0.1, ahead, cutoff, carrier=carrier) for y in sides
+    ]
 
 
 def cyclists(site: Site, rng: np.random.Generator, y: float) -> None:
     """Perhaps somebody on a bicycle at the edge of the lane."""
     if rng.random() < 0.3:
         x, speed = site.travel_m * rng.uniform() + rng.uniform(4.0, 12.0), rng.uniform(2.5, 6.5)
-        site.move(vehicles.cyclist(rng), Motion(Pose((x, y, 0.0)), speed))
+        site.move(cycles.cyclist(rng), Motion(Pose((x, y, 0.0)), speed))
 
 
 def row(
@@ -139,8 +176,9 @@ def roadside_thing(rng: np.random.Generator) -> Mesh:
     """Something from the edge of a country road."""
     return one_of(
         rng,
-        (furniture.tree, furniture.tree, furniture.bush, furniture.bush, furniture.sign,
-         furniture.pole, furniture.bollard, furniture.cone),
+        (plants.tree, plants.tree, plants.shrub, plants.shrub, plants.shrub, furniture.sign,
+         furniture.pole, furniture.delineator, furniture.delineator, furniture.cone,
+         furniture.chevron_board, furniture.bench),
     )  # fmt: skip
 
 
@@ -149,5 +187,6 @@ def pavement_thing(rng: np.random.Generator) -> Mesh:
     return one_of(
         rng,
         (furniture.bollard, furniture.sign, furniture.sign, furniture.crate, furniture.rubbish_bin,
-         furniture.tree, furniture.bush, furniture.pole, furniture.cone),
+         plants.tree, plants.bush, furniture.pole, furniture.cone, furniture.cabinet,
+         furniture.letter_box, furniture.planter, cycles.bicycle, shelters.pavement_glass),
     )  # fmt: skip

@@ -1,17 +1,16 @@
-"""Things on wheels, standing on z = 0 and facing +x."""
+"""Cars and vans, standing on z = 0 and facing +x; and any vehicle of the traffic."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
+from shotenv.world import cycles, heavy, meshes
 from shotenv.world import materials as m
-from shotenv.world import meshes
 from shotenv.world.materials import Material
 from shotenv.world.model import Mesh
-from shotenv.world.people import seated_rider
+from shotenv.world.wheels import wheel
 
 Profile = list[tuple[float, float]]
 
@@ -58,10 +57,24 @@ def van_shape(rng: np.random.Generator) -> CarShape:
     return CarShape(length, width, body, cabin, 0.95 * width, rng.uniform(0.32, 0.36))
 
 
+def traffic(rng: np.random.Generator, headlight: float = 0.0, tail: float = 0.0) -> Mesh:
+    """Any motor vehicle of the traffic; its lamps' faces have these radiances, W m-2 sr-1."""
+    draw = (car, van, heavy.lorry, heavy.bus, cycles.motorcycle)[
+        rng.choice(5, p=(0.64, 0.12, 0.10, 0.06, 0.08))
+    ]
+    return draw(rng, headlight, tail)
+
+
+def parked_car(rng: np.random.Generator) -> Mesh:
+    """A car or, less often, a van, with its lamps off."""
+    return van(rng) if rng.random() < 0.18 else car(rng)
+
+
+@meshes.thing
 def car(
     rng: np.random.Generator, headlight_radiance: float = 0.0, tail_radiance: float = 0.0
 ) -> Mesh:
-    """A car or van with windows, wheels, lamps and retro-reflecting number plates.
+    """A car with windows to look through, wheels, lamps and retro-reflecting number plates.
 
     Parameters
     ----------
@@ -69,16 +82,38 @@ def car(
     headlight_radiance, tail_radiance : float
         Radiance of the lamps' faces, W m-2 sr-1; 0 is off.
     """
-    shape = van_shape(rng) if rng.random() < 0.2 else saloon_shape(rng)
-    paint = car_paint(rng)
+    shape, paint = saloon_shape(rng), car_paint(rng)
+    glass = (m.CLEAR_GLASS if rng.random() < 0.7 else m.TINTED_GLASS).draw(rng)
+    inside = [hollow_cabin(shape, paint, glass), seats(rng, shape)]
+    return meshes.join([*inside, chassis(rng, shape, paint, headlight_radiance, tail_radiance)])
+
+
+@meshes.thing
+def van(
+    rng: np.random.Generator, headlight_radiance: float = 0.0, tail_radiance: float = 0.0
+) -> Mesh:
+    """A delivery van, mostly without windows behind the front seats; parameters as of `car`."""
+    shape, paint = van_shape(rng), car_paint(rng)
+    cargo = meshes.extrude(shape.cabin, shape.cabin_width, paint)
+    panes = meshes.join(
+        meshes.polygon(meshes.inset(outline, 0.16, 0.01), m.GLASS.draw(rng))
+        for outline in outlines(shape, rear_share=0.66)[: 2 if rng.random() < 0.6 else 6]
+    )
+    return meshes.join(
+        [cargo, panes, chassis(rng, shape, paint, headlight_radiance, tail_radiance)]
+    )
+
+
+def chassis(
+    rng: np.random.Generator, shape: CarShape, paint: Material, headlight: float, tail: float
+) -> Mesh:
+    """Lower body, wheels, lamps and plates."""
     return meshes.join(
         [
             meshes.extrude(shape.body, shape.width, paint),
-            meshes.extrude(shape.cabin, shape.cabin_width, paint),
-            windows(rng, shape),
             wheels(rng, shape),
-            front_trim(rng, shape, headlight_radiance),
-            rear_trim(rng, shape, tail_radiance),
+            front_trim(rng, shape, headlight),
+            rear_trim(rng, shape, tail),
         ]
     )
 
@@ -89,24 +124,43 @@ def car_paint(rng: np.random.Generator) -> Material:
     return kinds[rng.choice(3, p=(0.3, 0.45, 0.25))].draw(rng)
 
 
-def windows(rng: np.random.Generator, shape: CarShape) -> Mesh:
-    """Wind screen, rear window and two panes on each side, a centimetre off the cabin."""
-    glass = m.GLASS.draw(rng)
+def outlines(shape: CarShape, rear_share: float = 0.5) -> list[list[meshes.Point]]:
+    """Where the cabin has windows: wind screen, rear window, front and rear panes of each side."""
     rear, nose, front_roof, rear_roof = shape.cabin
     half = shape.cabin_width / 2
-    screens = [_pane(nose, front_roof, half), _pane(rear_roof, rear, half)]
-    middle_low, middle_high = _between(rear, nose), _between(rear_roof, front_roof)
-    outlines = [
-        (middle_low, nose, front_roof, middle_high),
-        (rear, middle_low, middle_high, rear_roof),
+    low, high = _between(rear, nose, rear_share), _between(rear_roof, front_roof, rear_share)
+    sides = [(low, nose, front_roof, high), (rear, low, high, rear_roof)]
+    right = [[(x, -half, z) for x, z in side] for side in sides]
+    left = [[(x, half, z) for x, z in side[::-1]] for side in sides]
+    across = [_screen(nose, front_roof, half), _screen(rear_roof, rear, half)]
+    return [across[0], right[0], left[0], across[1], right[1], left[1]]
+
+
+def hollow_cabin(shape: CarShape, paint: Material, glass: Material) -> Mesh:
+    """Roof and window frames, with panes in them."""
+    _, _, front_roof, rear_roof = shape.cabin
+    parts = [meshes.polygon(_screen(front_roof, rear_roof, shape.cabin_width / 2), paint)]
+    for outline in outlines(shape):
+        pane = meshes.inset(outline, 0.16, 0.0)
+        parts += [meshes.frame(outline, pane, paint), meshes.polygon(pane, glass)]
+    return meshes.join(parts)
+
+
+def seats(rng: np.random.Generator, shape: CarShape) -> Mesh:
+    """Dashboard, two seat backs and a rear bench."""
+    cloth, (roof_x, roof_z) = m.UPHOLSTERY.draw(rng), shape.cabin[2]
+    low, width = 0.90, shape.cabin_width
+    high = roof_z - low - 0.14
+    backs = [
+        meshes.box((0.14, 0.45, high), cloth, (roof_x - 0.35, y, low))
+        for y in (-width / 4, width / 4)
     ]
-    right = [[(x, -half, z) for x, z in outline] for outline in outlines]
-    left = [[(x, half, z) for x, z in outline[::-1]] for outline in outlines]
-    panes = [*screens, *right, *left]
-    return meshes.join(meshes.polygon(meshes.inset(pane, 0.16, 0.01), glass) for pane in panes)
+    bench = meshes.box((0.16, 0.8 * width, 0.8 * high), cloth, (roof_x - 1.15, 0.0, low))
+    dash = meshes.box((0.3, 0.8 * width, 0.12), cloth, (roof_x + 0.45, 0.0, low))
+    return meshes.join([*backs, bench, dash])
 
 
-def _pane(low: tuple[float, float], high: tuple[float, float], half: float) -> list[meshes.Point]:
+def _screen(low: tuple[float, float], high: tuple[float, float], half: float) -> list[meshes.Point]:
     """Rectangle across the car between two profile points, seen from outside."""
     return [
         (low[0], -half, low[1]), (low[0], half, low[1]),
@@ -114,8 +168,8 @@ def _pane(low: tuple[float, float], high: tuple[float, float], half: float) -> l
     ]  # fmt: skip
 
 
-def _between(a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
-    return (a[0] + b[0]) / 2, (a[1] + b[1]) / 2
+def _between(a: tuple[float, float], b: tuple[float, float], share: float) -> tuple[float, float]:
+    return a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
 
 
 def wheels(rng: np.random.Generator, shape: CarShape) -> Mesh:
@@ -127,18 +181,6 @@ def wheels(rng: np.random.Generator, shape: CarShape) -> Mesh:
         for x in (-axle, axle)
         for side in (-1, 1)
     )
-
-
-def wheel(x: float, side: int, half: float, radius: float, tyre: Material, rim: Material) -> Mesh:
-    """A tyre that looks out of the body by 2 cm, and its rim."""
-    outer, inner = side * (half + 0.02), side * (half - 0.20)
-    turns = np.linspace(0, 2 * np.pi, 8, endpoint=False) * -side
-    disc = [
-        (x + 0.62 * radius * np.cos(a), outer + side * 0.008, radius + 0.62 * radius * np.sin(a))
-        for a in turns
-    ]
-    rubber = meshes.rod((x, inner, radius), (x, outer, radius), radius, tyre, sections=12)
-    return meshes.join([rubber, meshes.polygon(disc, rim)])
 
 
 def front_trim(rng: np.random.Generator, shape: CarShape, radiance: float) -> Mesh:
@@ -164,22 +206,3 @@ def rear_trim(rng: np.random.Generator, shape: CarShape, radiance: float) -> Mes
     bumper = meshes.back((-half + 0.04, half - 0.04), (0.40, 0.52), x, m.RUBBER.draw(rng))
     plate = meshes.back((-0.26, 0.26), (0.62, 0.73), x, m.PLATE_SHEET.draw(rng))
     return meshes.join([*lamps, bumper, plate])
-
-
-def cyclist(rng: np.random.Generator) -> Mesh:
-    """A bicycle and the person on it."""
-    metal, tyre = m.DARK_METAL.draw(rng), m.TYRE.draw(rng)
-    hub_rear, hub_front, crank = (-0.5, 0.0, 0.35), (0.52, 0.0, 0.35), (-0.05, 0.0, 0.30)
-    saddle, handle = (-0.2, 0.0, 0.92), (0.38, 0.0, 0.98)
-    joints = [(hub_rear, crank), (hub_rear, saddle), (crank, saddle), (crank, handle)]
-    joints += [(saddle, handle), (handle, hub_front), ((0.38, -0.25, 1.0), (0.38, 0.25, 1.0))]
-    frame = [meshes.rod(a, b, 0.025, metal, sections=4) for a, b in joints]
-    hoops = [hoop(hub, 0.34, tyre) for hub in (hub_rear, hub_front)]
-    return meshes.join([*frame, *hoops, seated_rider(rng)])
-
-
-def hoop(hub: meshes.Point, radius: float, material: Material) -> Mesh:
-    """A bicycle wheel: an upright ring in the x-z plane about its hub."""
-    turns = np.linspace(0, 2 * np.pi, 10)
-    rim = [(hub[0] + radius * np.cos(a), hub[1], hub[2] + radius * np.sin(a)) for a in turns]
-    return meshes.join(meshes.rod(a, b, 0.03, material, sections=3) for a, b in pairwise(rim))
