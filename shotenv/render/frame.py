@@ -40,9 +40,18 @@ class RenderedFrame:
 
 
 def render_frame(
-    world: World, time_s: float, camera: CameraConfig, sensor: SensorConfig, *, seed: int
+    world: World,
+    time_s: float,
+    camera: CameraConfig,
+    sensor: SensorConfig,
+    *,
+    seed: int,
+    gray_exposure_s: float | None = None,
 ) -> RenderedFrame:
     """Render the frame of `world` whose first sample starts at `time_s`.
+
+    What moves is blurred in the ambient light over `gray_exposure_s` seconds, by default the
+    longest gray exposure.
 
     Raises
     ------
@@ -52,7 +61,7 @@ def render_frame(
     start_mitsuba()
     from shotenv.render.integrator import trace
 
-    instants = frame_instants(time_s, camera, sensor)
+    instants = frame_instants(time_s, camera, sensor, gray_exposure_s=gray_exposure_s)
     weights = harmonic_weights(sensor.harmonic_strength, sensor.highest_harmonic)
     traced = trace(world, instants, camera, harmonics=weights, seed=seed)
     laser, passive = np.array(instants.laser), np.array(instants.passive)

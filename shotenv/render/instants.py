@@ -36,18 +36,25 @@ class Instants:
         return len(self.times_s)
 
 
-def frame_instants(time_s: float, camera: CameraConfig, sensor: SensorConfig) -> Instants:
+def frame_instants(
+    time_s: float,
+    camera: CameraConfig,
+    sensor: SensorConfig,
+    *,
+    gray_exposure_s: float | None = None,
+) -> Instants:
     """Instants of a frame that starts at `time_s`: eight samples, then the gray exposure.
 
     The samples start at the times of `unwrap.acquisition`; the gray instants are the midpoints of
-    equal parts of the longest gray exposure, which ends where the first sample starts.
+    equal parts of the gray exposure (None: the longest), which ends where the first sample starts.
     """
     samples = [time_s + t for t in sample_times_s(Shots.EIGHT, sensor.sample_period_s)]
     frequencies_hz = (sensor.f1_hz, sensor.f2_hz)
     sample_hz = [frequencies_hz[frequency_index(k)] for k in range(len(samples))]
     theta_rad = [demodulation_phase_rad(k) for k in range(len(samples))]
     gray_count = camera.gray_instants
-    gray = [time_s - sensor.gray_max_exposure_s * (i + 0.5) / gray_count for i in range(gray_count)]
+    exposure_s = sensor.gray_max_exposure_s if gray_exposure_s is None else gray_exposure_s
+    gray = [time_s - exposure_s * (i + 0.5) / gray_count for i in range(gray_count)]
     laser = (True,) * len(samples) + (False,) * gray_count
     unmodulated = (0.0,) * gray_count
     return Instants(

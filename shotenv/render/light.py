@@ -18,7 +18,7 @@ from shotenv.render.device import upload
 from shotenv.render.geometry import REACH_M, rotation
 from shotenv.render.instants import Instants
 from shotenv.render.scene import Hit, Scene
-from shotenv.world.model import MAX_LAMPS, Indoor, Lamp, Pose, World
+from shotenv.world.model import MAX_LAMPS, Indoor, Lamp, World
 
 _LAMP_NUMBERS = 12
 
@@ -54,9 +54,7 @@ class PassiveLight:
 
     def __init__(self, world: World, instants: Instants):
         light = world.light
-        start, poses = world.ego.at(0.0), [world.ego.at(t) for t in instants.times_s]
-        table = np.stack([lamp_table(light.lamps, start, pose) for pose in poses])
-        self._lamps = upload(table)
+        self._lamps = upload(np.stack([lamp_table(world, t) for t in instants.times_s]))
         self._lamp_count = dr.opaque(mi.UInt32, len(light.lamps))
         self._opening = _Opening(light.indoor)
         self._sun_irradiance = dr.opaque(mi.Float, light.sun_irradiance)
@@ -184,20 +182,29 @@ def spot_falloff(cos_axis, cutoff_cos):
     return dr.select(cutoff_cos <= -1, 1, t * t * (3 - 2 * t))
 
 
-def lamp_table(lamps: tuple[Lamp, ...], start: Pose, camera: Pose) -> np.ndarray:
+def lamp_table(world: World, time_s: float) -> np.ndarray:
     """Rows [MAX_LAMPS, 12]: position, intensity, axis, cutoff cosine, radius, zeros.
 
-    Lamps are where they are at time 0, when the camera is at `start`; those that ride have since
-    moved rigidly with it.
+    Lamps that ride with the camera or are carried have moved rigidly with it since time 0.
     """
     table = np.zeros((MAX_LAMPS, _LAMP_NUMBERS), np.float32)
-    turn = rotation(camera) @ rotation(start).T
-    for row, lamp in zip(table, lamps, strict=False):
-        position, axis = np.asarray(lamp.position_m), np.asarray(lamp.direction)
-        if lamp.rides:
-            position = turn @ (position - start.position_m) + camera.position_m
-            axis = turn @ axis
+    for row, lamp in zip(table, world.light.lamps, strict=False):
+        turn, position = _lamp_pose(world, lamp, time_s)
+        axis = turn @ lamp.direction
         row[:3], row[3] = position, lamp.intensity_w_sr
         row[4:7], row[7] = axis / np.linalg.norm(axis), lamp.cutoff_cos
         row[8] = lamp.radius_m
     return table
+
+
+def _lamp_pose(world: World, lamp: Lamp, time_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation [3, 3] from the axes that a lamp is described in to the world's, and its place."""
+    position = np.asarray(lamp.position_m)
+    if lamp.carrier is not None:
+        carrier = world.moving[lamp.carrier].motion.at(time_s)
+        return rotation(carrier), rotation(carrier) @ position + carrier.position_m
+    if lamp.rides:
+        start, camera = world.ego.at(0.0), world.ego.at(time_s)
+        turn = rotation(camera) @ rotation(start).T
+        return turn, turn @ (position - start.position_m) + camera.position_m
+    return np.eye(3), position

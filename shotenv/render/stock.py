@@ -5,6 +5,7 @@ Nothing of the sensor is made with it: tests compare the integrator with it, ben
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import mitsuba as mi
@@ -16,19 +17,28 @@ from shotenv.render.scene import triangle_mesh
 from shotenv.render.texture import noise_texture
 from shotenv.world.model import Light, Pose, World
 
-_NEAR_CLIP_M = 1e-3
+_NEAR_CLIP_M = 1e-5
+_FILM = {"type": "hdrfilm", "pixel_format": "luminance"}
 
 
-def stock_scene(world: World, time_s: float, camera: CameraConfig) -> Any:
+def stock_scene(
+    world: World,
+    time_s: float,
+    camera: CameraConfig,
+    film: Mapping[str, Any] = _FILM,
+    **emitters: Mapping[str, Any],
+) -> Any:
     """A Mitsuba scene of `world` at `time_s`: surfaces, sun, a uniform sky, the camera.
 
-    The sky has its zenith radiance everywhere; there are no lamps and no laser.
+    The sky has its zenith radiance everywhere; surfaces are diffuse; there are no lamps and no
+    laser but the `emitters` given.
     """
     description = {
         "type": "scene",
         "triangles": _triangles(world, time_s),
-        "sensor": _sensor(world.ego.at(time_s), camera),
+        "sensor": _sensor(world.ego.at(time_s), camera, film),
         **_emitters(world.light),
+        **emitters,
     }
     return mi.load_dict(description)
 
@@ -66,10 +76,10 @@ def _textured() -> dict[str, Any]:
     return {"type": "twosided", "bsdf": {**blend, "b": diffuse("face_high")}}
 
 
-def _sensor(pose: Pose, camera: CameraConfig) -> dict[str, Any]:
+def _sensor(pose: Pose, camera: CameraConfig, film: Mapping[str, Any]) -> dict[str, Any]:
     ahead, _, up = rotation(pose).T
     eye = np.asarray(pose.position_m)
-    film = {"width": camera.width, "height": camera.height, "rfilter": {"type": "box"}}
+    size = {"width": camera.width, "height": camera.height, "rfilter": {"type": "box"}}
     return {
         "type": "perspective",
         "fov": camera.horizontal_fov_deg,
@@ -78,7 +88,7 @@ def _sensor(pose: Pose, camera: CameraConfig) -> dict[str, Any]:
         "to_world": mi.ScalarTransform4f().look_at(
             origin=eye.tolist(), target=(eye + ahead).tolist(), up=up.tolist()
         ),
-        "film": {"type": "hdrfilm", "pixel_format": "luminance", **film},
+        "film": {**film, **size},
         "sampler": {"type": "independent"},
     }
 

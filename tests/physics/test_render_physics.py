@@ -183,6 +183,25 @@ def test_lamps_ride_with_the_camera_or_stay(trace):
         assert traced.ambient[0][MIDDLE] == pytest.approx(expected, rel=1e-4)
 
 
+def test_a_lamp_goes_where_its_carrier_goes(trace):
+    # In the carrier's own axes the lamp is 1 m ahead and shines ahead: at the wall of x = 10.
+    lamp = Lamp((1.0, 0.0, 1.0), 4.0, 0.1, direction=(1.0, 0.0, 0.0), cutoff_cos=0.5, carrier=1)
+    buried = mesh(square((0, 0, -50.0), (1, 0, 0), (0, 1, 0)))
+    away = MovingObject(buried, Motion(Pose((0.0, 3.0, 0.0)), 50.0))
+    coming = MovingObject(buried, Motion(Pose((5.0, -2.0, 0.0), math.pi / 2), 1.0, -math.pi / 4))
+    scene = world(mesh(wall(10.0)), light=replace(DARK, lamps=(lamp,)), moving=(away, coming))
+    pose = coming.motion.at(2.0)
+    assert pose.yaw_rad == pytest.approx(0.0, abs=1e-9)
+    gap_m, aside_m = 10.0 - (pose.position_m[0] + 1.0), pose.position_m[1]
+    square_m2 = gap_m**2 + aside_m**2
+    cosine = gap_m / math.sqrt(square_m2)
+    t = (cosine - 0.5) / 0.5
+    expected = 4.0 * t * t * (3 - 2 * t) * cosine / (square_m2 + 0.01) * ALBEDO / math.pi
+    traced = trace(scene, at(0.0, 2.0), SMALL, seed=0)
+    assert traced.ambient[1][MIDDLE] == pytest.approx(expected, rel=1e-4)
+    assert traced.ambient[0][MIDDLE] == 0.0
+
+
 def test_close_to_a_lamp_there_are_no_fireflies(trace):
     camera = SMALL.model_copy(update={"samples_per_pixel": 64, "bounces": 4})
     lamps = (Lamp((4.95, 0.3, 1.0), 1.0), Lamp((2.0, -1.9, 1.0), 1.0))
