@@ -100,6 +100,8 @@ def test_samples_are_taken_at_their_own_instants(sensor):
     assert instants.times_s[:8] == pytest.approx([2.0 + start for start in starts])
     exposure_s = sensor.gray_max_exposure_s
     assert instants.times_s[8:] == pytest.approx([2.0 - exposure_s / 4, 2.0 - exposure_s * 3 / 4])
+    shorter = frame_instants(2.0, CAMERA, sensor, gray_exposure_s=exposure_s / 5)
+    assert shorter.times_s[8:] == pytest.approx([2.0 - exposure_s / 20, 2.0 - exposure_s * 3 / 20])
     assert instants.laser == (True,) * 8 + (False,) * 2
     assert len(set(instants.draw[:8])) == 1
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -31,6 +32,10 @@ from shotenv.render.llvm import require_llvm
 from shotenv.render.workers import available_cores, run_jobs
 from unwrap.acquisition import Shots
 from unwrap.files import write_json
+
+if TYPE_CHECKING:  # How worlds are drawn and rendered is loaded where it is done.
+    from shotenv.render import RenderedFrame
+    from shotenv.world.model import World
 
 RENDERING_VERSION = 2
 """Raised when the same configuration would give other light: old banks are then left alone."""
@@ -56,6 +61,9 @@ ACQUISITION_FIELDS = {
     "max_range_m",
 }
 """Fields of the sensor that neither light nor gray image depend on: a bank serves all of them."""
+
+METER_REDUCTION = 4
+"""The light meter sees one pixel where the camera sees so many each way."""
 
 FRAMES_PER_WORKER = 512
 """Rendered frames after which a worker process is replaced: rebuilding scenes leaks memory."""
@@ -228,16 +236,12 @@ def _render(jobs: Sequence[ClipJob], config: BankConfig, workers: int) -> None:
 
 def render_clip(job: ClipJob) -> str:
     """Render one clip and write it; returns its name. Runs in a worker process."""
-    from shotenv.render import render_frame
     from shotenv.world import draw_world
 
     config = job.config
     world = draw_world(job.family, job.seed, config.world)
     times = np.arange(config.world.frames_per_clip) / config.world.frame_rate_hz
-    rendered = [
-        render_frame(world, float(time), config.camera, config.sensor, seed=_seed(job.seed, number))
-        for number, time in enumerate(times)
-    ]
+    rendered = _render_frames(world, times, config, job.seed)
     light = {
         name: np.stack([getattr(frame, name) for frame in rendered])
         for name in ARRAYS
@@ -257,6 +261,32 @@ def render_clip(job: ClipJob) -> str:
     }
     write_clip(job.folder, {**light, "gray": gray}, metadata)
     return job.name
+
+
+def _render_frames(
+    world: World, times: np.ndarray, config: BankConfig, seed: int
+) -> list[RenderedFrame]:
+    """Frames of a clip; motion blurs gray for as long as the frame before called for.
+
+    Before the first frame comes a coarse look, as a light meter takes it.
+    """
+    from shotenv.render import render_frame
+    from shotenv.sensor.gray import gray_exposure_s
+
+    camera, sensor = config.camera, config.sensor
+    coarse = {"width": camera.width // METER_REDUCTION, "height": camera.height // METER_REDUCTION}
+    meter = camera.model_copy(update=coarse)
+    frames = [render_frame(world, float(times[0]), meter, sensor, seed=_seed(seed, len(times)))]
+    for number, time in enumerate(times):
+        light = torch.from_numpy(frames[-1].ambient).unsqueeze(0)
+        exposure_s = float(gray_exposure_s(light, sensor))
+        frame_seed = _seed(seed, number)
+        frames.append(
+            render_frame(
+                world, float(time), camera, sensor, seed=frame_seed, gray_exposure_s=exposure_s
+            )
+        )
+    return frames[1:]
 
 
 def _capture(ambient: np.ndarray, job: ClipJob) -> tuple[np.ndarray, list[float]]:

@@ -19,9 +19,8 @@ def capture_gray(
 
     Parameters
     ----------
-    ambient : float32 [B, H, W] or [B, G, H, W]
-        Radiance inside the band filter, W m-2 sr-1; where things move, of G parts of the longest
-        exposure, the latest first, see `mean_over_exposure`.
+    ambient : float32 [B, H, W]
+        Radiance inside the band filter, W m-2 sr-1, mean over the exposure where things move.
     sensor : SensorConfig
         The imager; a full tap is the converter's full scale.
     noise : float32 [B, H, W] or None
@@ -34,11 +33,9 @@ def capture_gray(
     exposure_s : float32 [B]
         Exposure time of each image, seconds.
     """
-    parts = ambient if ambient.ndim == 4 else ambient.unsqueeze(1)
-    exposure_s = gray_exposure_s(parts.mean(dim=1), sensor)
+    exposure_s = gray_exposure_s(ambient, sensor)
     rate = electrons_per_radiance_second(sensor)
-    charge_e = mean_over_exposure(parts, exposure_s, sensor)
-    charge_e *= (rate * exposure_s)[:, None, None]
+    charge_e = ambient * (rate * exposure_s)[:, None, None]
     if noise is not None:
         add_noise(charge_e, noise, sensor.read_noise_e)
     charge_e = clip_to_full_well(charge_e, sensor.full_well_e)
@@ -51,22 +48,6 @@ def gray_exposure_s(ambient: Tensor, sensor: SensorConfig) -> Tensor:
     mean_rate_e_s = ambient.mean(dim=(-2, -1)) * electrons_per_radiance_second(sensor)
     wanted_e = sensor.gray_target * sensor.full_well_e
     return (wanted_e / mean_rate_e_s).clamp(SHORTEST_EXPOSURE_S, sensor.gray_max_exposure_s)
-
-
-def mean_over_exposure(parts: Tensor, exposure_s: Tensor, sensor: SensorConfig) -> Tensor:
-    """Mean radiance [B, H, W] over exposures [B] that end where the longest one would end.
-
-    Parameters
-    ----------
-    parts : [B, G, H, W]
-        Radiance in the middle of G equal parts of the longest exposure, the latest first. A
-        shorter exposure sees fewer of them, the last one in part, so blur goes with exposure.
-    """
-    count = parts.shape[1]
-    lengths = (exposure_s * (count / sensor.gray_max_exposure_s)).unsqueeze(1)
-    seen = (lengths - torch.arange(count).to(lengths)).clamp_(0.0, 1.0)
-    weights = seen / seen.sum(dim=1, keepdim=True)
-    return (parts * weights[:, :, None, None].to(parts.dtype)).sum(dim=1)
 
 
 def gray_gain_lsb_per_e(sensor: SensorConfig) -> float:

@@ -22,7 +22,6 @@ from shotenv.sensor import (
     residual_drift_m,
     stream,
 )
-from shotenv.sensor.gray import mean_over_exposure
 from unwrap.acquisition import Shots, demodulation_phase_rad
 
 POWER_W, INTEGRATION_S = 7.0, 6e-4
@@ -149,53 +148,6 @@ def test_distance_drifts_per_kelvin_and_is_compensated_in_part(sensor, per_kelvi
     assert drift_m.tolist() == pytest.approx([0.0, 20 * per_kelvin_m], abs=1e-12)
     left_m = residual_drift_m(drifting, imager_k)
     assert left_m.tolist() == pytest.approx(((1 - share) * drift_m).tolist())
-
-
-def edge_moving_one_pixel_per_part(parts, width=24):
-    """An edge that moves towards higher columns; the latest part comes first."""
-    columns = torch.arange(width)
-    latest = 16
-    maps = [torch.where(columns < latest - part, 2.0, 1.0) for part in range(parts)]
-    return torch.stack(maps).unsqueeze(1).expand(parts, 4, width).unsqueeze(0)
-
-
-@pytest.mark.parametrize("share", [1.0, 0.5, 0.25, 0.125, 0.3125])
-def test_gray_blur_is_proportional_to_the_exposure(sensor, share):
-    """An edge is blurred over the pixels that it moves while the exposure lasts."""
-    parts = edge_moving_one_pixel_per_part(8)
-    exposure_s = torch.tensor([share * sensor.gray_max_exposure_s])
-    row = mean_over_exposure(parts, exposure_s, sensor)[0, 0]
-    # The ramp's missing light, in pixels: the edge's mean distance from where it ended.
-    moved = 8 * share
-    mean_lag = sum(part * min(1.0, moved - part) for part in range(math.ceil(moved))) / moved
-    assert float((row - 1.0).sum()) == pytest.approx(16 - mean_lag, abs=1e-5)
-    blurred = int(((row > 1.0 + 1e-6) & (row < 2.0 - 1e-6)).sum())
-    assert blurred == math.ceil(moved) - 1
-
-
-def test_bright_scenes_are_exposed_shorter_and_blur_less(sensor):
-    blurred = []
-    for brightness in (0.01, 3.0):
-        parts = brightness * edge_moving_one_pixel_per_part(8)
-        gray, exposure_s = capture_gray(parts, sensor, noise=None)
-        row = gray[0, 0]
-        between = (row > row.min() + 2) & (row < row.max() - 2)
-        blurred.append((float(exposure_s) / sensor.gray_max_exposure_s, int(between.sum())))
-    assert blurred[0] == (pytest.approx(1.0), 7)
-    share, pixels = blurred[1]
-    assert share < 0.5 and pixels == math.ceil(8 * share) - 1
-
-
-def test_a_still_scene_gives_the_same_gray_from_parts_as_from_one_map(sensor):
-    generator = torch.Generator().manual_seed(0)
-    still = torch.rand(3, 10, 12, generator=generator) * torch.tensor([0.01, 0.3, 30.0]).view(
-        3, 1, 1
-    )
-    noise = torch.randn(3, 10, 12, generator=generator)
-    one, one_s = capture_gray(still, sensor, noise=noise)
-    many, many_s = capture_gray(still.unsqueeze(1).repeat(1, 4, 1, 1), sensor, noise=noise)
-    assert one_s.tolist() == pytest.approx(many_s.tolist())
-    assert (one - many).abs().max() <= 1
 
 
 def test_gray_noise_follows_photon_transfer(sensor):
