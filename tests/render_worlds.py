@@ -96,3 +96,8 @@ def solid_angle_sr(camera: CameraConfig, steps: int = 2000) -> float:
     z = (np.arange(steps) + 0.5) / steps * 2 * down - down
     area = (2 * across / steps) * (2 * down / steps)
     return float(((1 + y[:, None] ** 2 + z[None, :] ** 2) ** -1.5).sum() * area)
+
+
+def laser_return(distance_m, cosine, camera: CameraConfig = SMALL):
+    """Radiance per watt that a Lambertian surface returns of an even laser beside the camera."""
+    return ALBEDO / math.pi * cosine / (solid_angle_sr(camera) * distance_m**2)
