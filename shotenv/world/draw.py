@@ -52,7 +52,7 @@ def _tunnel(site: Site, rng: np.random.Generator) -> None:
 
 
 def _warehouse(site: Site, rng: np.random.Generator) -> None:
-    warehouse.hall(site, rng, irradiance=(1e-2, 0.15))
+    warehouse.hall(site, rng, irradiance=(1e-2, 0.3))
 
 
 def _either(sun_share: float, low_share: float, night_share: float = 0.0) -> DrawLight:

@@ -22,25 +22,18 @@ Point = tuple[float, float, float]
 ORIGIN: Point = (0.0, 0.0, 0.0)
 _NEXT, _AFTER = [1, 2, 0], [2, 0, 1]
 _ACROSS = np.array([(1, 2), (0, 2), (0, 1)])
+_PER_FACE = ("albedo_low", "albedo_high", "retro", "emission", "mirror", "clear")
 _CORNERS = np.arange(3)[None, :, None]
 
 
 def soup(corners: np.ndarray, material: Material) -> Mesh:
     """Triangles [F, 3, 3] in metres, all of one material."""
-    faces = len(corners)
-
-    def per_face(value: float) -> np.ndarray:
-        return np.full(faces, value, dtype=np.float32)
-
+    numbers = np.array([getattr(material, name) for name in _PER_FACE], dtype=np.float32)
+    per_face = numbers[:, None].repeat(len(corners), axis=1)
     return Mesh(
         corners=np.asarray(corners, dtype=np.float32),
         uv=box_projection(corners, material),
-        albedo_low=per_face(material.albedo_low),
-        albedo_high=per_face(material.albedo_high),
-        retro=per_face(material.retro),
-        emission=per_face(material.emission),
-        mirror=per_face(material.mirror),
-        clear=per_face(material.clear),
+        **dict(zip(_PER_FACE, per_face, strict=True)),
     )
 
 
@@ -54,8 +47,15 @@ def box_projection(corners: np.ndarray, material: Material) -> np.ndarray:
 def area_vectors(corners: np.ndarray) -> np.ndarray:
     """Normals [F, 3] of triangles [F, 3, 3], as long as twice their area."""
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    # np.cross spends most of its time on checks; worlds are made of thousands of small calls.
-    return u[:, _NEXT] * v[:, _AFTER] - u[:, _AFTER] * v[:, _NEXT]
+    return cross(u, v)
+
+
+def cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Cross products of vectors [..., 3].
+
+    `np.cross` spends most of its time on checks; worlds are made of thousands of small calls.
+    """
+    return u.take(_NEXT, -1) * v.take(_AFTER, -1) - u.take(_AFTER, -1) * v.take(_NEXT, -1)
 
 
 def join(meshes: Iterable[Mesh]) -> Mesh:
@@ -158,9 +158,9 @@ def rod(
     """A capped cylinder between two points."""
     axis = np.subtract(end, start)
     length = np.linalg.norm(axis)
-    side = np.cross(axis / length, np.eye(3)[np.abs(axis).argmin()])
+    side = cross(axis / length, np.eye(3)[np.abs(axis).argmin()])
     side *= radius / np.linalg.norm(side)
-    across = np.cross(axis / length, side)
+    across = cross(axis / length, side)
     frame = np.stack([side, across, axis])
     return soup(_unit_cylinder(sections) @ frame + np.asarray(start), material)
 
@@ -172,8 +172,12 @@ def lathe(
     sections: int = 8,
 ) -> Mesh:
     """A solid of revolution about z; `profile` is (radius, height) from bottom to top."""
-    solid = trimesh.creation.revolve(np.asarray(profile, dtype=np.float64), sections=sections)
-    triangles = np.asarray(solid.triangles) + np.asarray(base)
+    radius, height = np.asarray(profile, dtype=np.float64).T[..., None]
+    turn = np.linspace(0.0, 2 * np.pi, sections + 1)
+    x, y = radius * np.cos(turn), radius * np.sin(turn)
+    ring = np.stack([x, y, np.broadcast_to(height, x.shape)], axis=-1)
+    a, b, c, d = ring[:-1, :-1], ring[:-1, 1:], ring[1:, 1:], ring[1:, :-1]
+    triangles = np.stack([a, b, c, a, c, d], axis=2).reshape(-1, 3, 3) + np.asarray(base)
     # Where the profile meets the axis, half of each quadrilateral has no area.
     area = np.linalg.norm(area_vectors(triangles), axis=1)
     return soup(triangles[area > 1e-9], material)

@@ -115,16 +115,15 @@ def blades(
     rng: np.random.Generator, count: int, spread_m: float, height_m: float, leaf: Material
 ) -> Mesh:
     """Upright pointed blades that bend outwards from the middle."""
-    parts = []
-    for turn in rng.uniform(0, 2 * np.pi, count):
-        foot = spread_m * rng.uniform(0.0, 0.6) * np.array([np.cos(turn), np.sin(turn)])
-        tip = foot + spread_m * rng.uniform(0.3, 1.0) * np.array([np.cos(turn), np.sin(turn)])
-        side = 0.12 * spread_m * np.array([-np.sin(turn), np.cos(turn)])
-        high = height_m * rng.uniform(0.6, 1.0)
-        parts.append(
-            meshes.polygon([(*(foot - side), 0.0), (*(foot + side), 0.0), (*tip, high)], leaf)
-        )
-    return meshes.join(parts)
+    turn = rng.uniform(0, 2 * np.pi, count)
+    outwards = spread_m * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    foot = rng.uniform(0.0, 0.6, (count, 1)) * outwards
+    tip = foot + rng.uniform(0.3, 1.0, (count, 1)) * outwards
+    side = 0.12 * outwards[:, ::-1] * np.array([-1.0, 1.0])
+    corners = np.zeros((count, 3, 3))
+    corners[..., :2] = np.stack([foot - side, foot + side, tip], axis=1)
+    corners[:, 2, 2] = height_m * rng.uniform(0.6, 1.0, count)
+    return meshes.soup(corners, leaf)
 
 
 @meshes.thing

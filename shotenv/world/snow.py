@@ -78,7 +78,7 @@ def roadside(rng: np.random.Generator) -> Mesh:
 @meshes.thing
 def snow_bank(rng: np.random.Generator) -> Mesh:
     """Snow thrown up by a plough, in lumps along y."""
-    snow, high = m.SNOW.draw(rng), rng.uniform(0.35, 1.2)
+    snow, high = m.SNOW.draw(rng), rng.uniform(0.3, 0.9)
     lumps = [
         meshes.blob(rng, 0.65, snow, (rng.uniform(-0.1, 0.1), y, 0.0)) for y in (-0.6, 0.0, 0.6)
     ]

@@ -35,7 +35,7 @@ def hall(site: Site, rng: np.random.Generator, irradiance: Range) -> None:
     for side in (-1, 1):
         y = side * (aisle / 2 + RACK_DEPTH_M / 2 + 0.1)
         row(site, rng, floor_thing, side * (aisle / 2 - 0.35), 3.0, 0.0, share=0.35)
-        for x in np.arange(0.5, min(end - 3.5, site.travel_m + 24.0), BAY_M + 0.02):
+        for x in np.arange(-1.0, min(end - 3.0, site.travel_m + 24.0), BAY_M + 0.02):
             site.put(pallet_rack(rng, min(3, int((height - 1.0) / 1.7))), x, y, -side * np.pi / 2)
     for y in np.arange(-half + 1.5, half - 1.0, 1.7):
         site.put(one_of(rng, (pallet, pallet, drum, pallet_jack)), end - rng.uniform(1, 2.2), y)
@@ -79,6 +79,7 @@ def docks(
         yard = (end, end + REACH_M), (-REACH_M, REACH_M)
         site.build(meshes.patch(*yard, -0.01, m.ASPHALT.draw(rng)))
         return
+    site.build(meshes.box((0.1, width, high), wall, (end + 0.25, 0.0, 0.0)))
     site.build(meshes.at(dock_door(rng, width), end + 0.1, 0.0, yaw=np.pi))
 
 
@@ -87,7 +88,7 @@ def dock_door(rng: np.random.Generator, width_m: float) -> Mesh:
     """A sectional door with a row of small panes between two buffers of rubber."""
     light, rubber, glass = m.WHITE_PAINT.draw(rng), m.RUBBER.draw(rng), m.GLASS.draw(rng)
     half = width_m / 2
-    sections = [meshes.box((0.05, width_m, 0.55), light, (0.03, 0.0, 0.56 * i)) for i in range(6)]
+    sections = [meshes.box((0.05, width_m, 0.55), light, (0.03, 0.0, 0.551 * i)) for i in range(6)]
     panes = [
         meshes.front((y, y + 0.4), (1.8, 2.1), 0.062, glass) for y in np.arange(-1.2, 1.0, 0.6)
     ]
