@@ -102,6 +102,20 @@ def test_workers_and_threads_change_no_bit(config, uninterrupted, tmp_path):
     assert read_manifest(tmp_path / "bank") == read_manifest(uninterrupted)
 
 
+def test_a_script_without_a_main_guard_renders_once_and_ends(config, tmp_path):
+    """Workers must not run the script that started them: it would wait for itself."""
+    script = tmp_path / "script.py"
+    script.write_text(PROGRAM)
+    one = merged(
+        config, {"train_clips": 0, "validation_clips": 0, "world": {"families": ["garage"]}}
+    )
+    words = [sys.executable, script, one.model_dump_json(), tmp_path / "bank", "1"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("Rendering bank") == 1
+    assert standing(tmp_path / "bank") == 1
+
+
 def test_a_deleted_clip_is_rendered_again(config, uninterrupted, tmp_path, monkeypatch):
     """And here in this very process, after whatever else the renderer has done in it."""
     folder = shutil.copytree(uninterrupted, tmp_path / "bank")

@@ -11,8 +11,10 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, nullcontext
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
+from types import ModuleType
 from typing import Generic, TypeVar
 
 from shotenv.render.llvm import RendererError
@@ -40,7 +42,8 @@ def run_jobs(
     Parameters
     ----------
     function : callable
-        At the top level of a module, so that it can be pickled; so must jobs and results.
+        At the top level of a module, so that it can be pickled; so must jobs and results. Where
+        that module is the script itself, the script needs the usual `__main__` guard.
     jobs : iterable
         What `function` is called with.
     workers, jobs_per_worker : int
@@ -89,7 +92,8 @@ class _Worker(Generic[Job, Result]):
         self.pipe, theirs = context.Pipe()
         arguments = (theirs, function, threads)
         self._process = context.Process(target=_serve, args=arguments, daemon=True)
-        self._process.start()
+        with nullcontext() if function.__module__ == "__main__" else _no_main_module():
+            self._process.start()
         theirs.close()
         self._last_seen_s = time.monotonic()
         self.jobs_left = jobs_left
@@ -180,6 +184,21 @@ def _continued(
         return [worker]
     worker.retire()
     return []
+
+
+@contextmanager
+def _no_main_module() -> Iterator[None]:
+    """Hide `__main__`, which a spawned process imports anew.
+
+    A script that renders at its top level would otherwise run again in the worker, up to the
+    same rendering, and wait there for its own parent.
+    """
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 def _serve(pipe: Connection, function: Callable[[Job], Result], threads: int) -> None:
