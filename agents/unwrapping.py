@@ -47,7 +47,7 @@ def _clip_scores(problem: Problem, clip: Clip) -> list[Scores]:
     for place in range(clip.frames):
         step = torch.tensor([place])
         noise = list(islice(noise_of(drive, step, bank.height, bank.width), Shots.EIGHT))
-        made = {shots: acquire_depth(problem, drive, step, shots, noise) for shots in Shots}
+        made = {shots: acquire_depth(problem, drive, step, shots, noise=noise) for shots in Shots}
         one = made[Shots.EIGHT]
         scores.append(
             evaluate(
@@ -58,6 +58,7 @@ def _clip_scores(problem: Problem, clip: Clip) -> list[Scores]:
                 problem.description,
                 offset_lsb=drive.offsets.calibrated_lsb,
                 noise_lsb=one.noise_lsb,
+                shift_m=drive.drift_m,
             )
         )
     return scores

@@ -12,7 +12,14 @@ from shotenv.bank import Clip
 from shotenv.config import EnvConfig, Range
 from shotenv.frames import ShotCost
 from shotenv.laser import shot_cost
-from shotenv.sensor import OffsetPattern, Purpose, draw_offsets, stream
+from shotenv.sensor import (
+    OffsetPattern,
+    Purpose,
+    draw_offsets,
+    imager_temperature_k,
+    residual_drift_m,
+    stream,
+)
 from unwrap.acquisition import Shots
 
 FAMILY_STAYS = 0.5
@@ -35,6 +42,8 @@ class Drive:
         Laser temperature before the first frame.
     offsets : OffsetPattern
         Fixed pattern of the imager, [B, H, W].
+    drift_m : float64 [B]
+        What the imager's temperature adds to every distance, compensation included, metres.
     always_eight : ShotCost
         What a frame of eight samples costs with this laser and integration time.
     """
@@ -46,6 +55,7 @@ class Drive:
     ambient_k: Tensor
     start_k: Tensor
     offsets: OffsetPattern
+    drift_m: Tensor
     always_eight: ShotCost
 
     def frame(self, step: Tensor) -> Tensor:
@@ -67,7 +77,14 @@ def draw_drive(
     laser_power_w = _log_uniform(config.laser.optical_power_w, unit[0:1])
     integration_s = _log_uniform(config.sensor.integration_s, unit[1:2])
     ambient_k = _uniform(config.laser.ambient_k, unit[2:3])
-    offsets = draw_offsets(config.sensor, height, width, generator=stream(Purpose.OFFSETS, seed))
+    imager_k = imager_temperature_k(config.sensor, ambient_k)
+    offsets = draw_offsets(
+        config.sensor,
+        height,
+        width,
+        generator=stream(Purpose.OFFSETS, seed),
+        imager_k=float(imager_k),
+    )
     return Drive(
         seed=torch.tensor([seed]),
         frames=frames.unsqueeze(0),
@@ -76,6 +93,7 @@ def draw_drive(
         ambient_k=ambient_k,
         start_k=ambient_k + unit[3:4] * (config.laser.release_k - ambient_k),
         offsets=offsets,
+        drift_m=residual_drift_m(config.sensor, imager_k),
         always_eight=shot_cost(
             torch.tensor([int(Shots.EIGHT)]),
             config.laser,

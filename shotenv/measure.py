@@ -98,6 +98,7 @@ def acquire_depth(
         # Four samples of a frequency cancel the offset by themselves.
         offset_lsb=drive.offsets.calibrated_lsb if shots == Shots.TWO else None,
         noise_lsb=noise_lsb,
+        shift_m=drive.drift_m,
     )
     scored = scored_pixels(electrons, exposure.distance_m, problem)
     return Acquisition(raw, depth, prediction_m, noise_lsb, exposure.distance_m, scored)

@@ -15,7 +15,12 @@ import torch
 from shotenv.bank.store import write_clip, write_manifest
 from shotenv.config import FAMILIES, BankConfig, SensorConfig, find_config, read_config
 from shotenv.sensor import capture_gray
-from unwrap.acquisition import demodulation_phase_rad, frequency_index, sample_times_s
+from unwrap.acquisition import (
+    demodulation_phase_rad,
+    frequency_index,
+    harmonic_weights,
+    sample_times_s,
+)
 from unwrap.nets import TofRegNet
 from unwrap.weights import save_weights
 
@@ -65,13 +70,15 @@ def light_of(family: str, seed: int, time_s: float, sensor: SensorConfig) -> dic
     """Closed-form light of one frame: one bounce, every sample at its own instant."""
     times = [time_s + t for t in sample_times_s(8, sensor.sample_period_s)]
     frequencies = (sensor.f1_hz, sensor.f2_hz)
+    weights = harmonic_weights(sensor.harmonic_strength, sensor.highest_harmonic)
     correlation, active = [], []
     for k, instant in enumerate(times):
         distance, albedo, _ = scene_at(family, seed, instant)
         radiance = albedo / math.pi / (LASER_SOLID_ANGLE_SR * distance**2)
         hit = np.where(np.isinf(distance), 0.0, distance)
         phase = 4 * math.pi * frequencies[frequency_index(k)] * hit / SPEED_OF_LIGHT_M_S
-        correlation.append(radiance * np.cos(phase - demodulation_phase_rad(k)))
+        angle = phase - demodulation_phase_rad(k)
+        correlation.append(radiance * sum(w * np.cos(h * angle) for h, w in weights))
         active.append(radiance)
     distance, albedo, _ = scene_at(family, seed, time_s)
     irradiance = AMBIENT_IRRADIANCE_W_M2[family] * (1 + 0.3 * math.sin(seed + time_s))

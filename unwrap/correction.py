@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from unwrap.acquisition import SAMPLES_PER_FREQUENCY, Shots
+from unwrap.calibration import WiggleTable, shifted
 from unwrap.dual import unwrap_dual
 from unwrap.frames import DepthFrame, PhaseFrame, RawFrame
 from unwrap.merge import merge_nearest, merge_regression, weights_of
@@ -46,6 +47,8 @@ class SensorDescription:
         Disagreement of the two frequencies above which they are not trusted: the pixel is merged
         with the prediction, or invalid without one. With 24 and 10 MHz candidates within 25 m lie
         2.5 m apart, so that 1.25 m is the most there is.
+    wiggle : tuple of two WiggleTable, or None
+        Stored phase errors at f1 and f2.
     """
 
     f1_hz: float = 24e6
@@ -55,6 +58,7 @@ class SensorDescription:
     noise_lsb: float = 1.5
     min_snr: float = 1.0
     max_residual_m: float = 1.0
+    wiggle: tuple[WiggleTable, WiggleTable] | None = None
 
 
 @dataclass(frozen=True)
@@ -82,6 +86,7 @@ def correct(
     merge: Merge = "nearest",
     offset_lsb: Tensor | None = None,
     noise_lsb: Tensor | float | None = None,
+    shift_m: Tensor | None = None,
 ) -> DepthFrame:
     """Unwrapped depth of a batch of frames with the same number of samples.
 
@@ -100,6 +105,8 @@ def correct(
         Stored dark-offset map.
     noise_lsb : float or float [B, H, W], optional
         Standard deviation of one sample, if known better than `sensor.noise_lsb`.
+    shift_m : float [B], optional
+        See `decode_at`.
 
     Raises
     ------
@@ -109,13 +116,13 @@ def correct(
     """
     if merge not in MERGES:
         raise ValueError(f"merge is {merge!r}; expected one of {', '.join(MERGES)}")
-    first = decode(raw.dcs_lsb[:, :SAMPLES_PER_FREQUENCY], offset_lsb=offset_lsb)
+    first = decode_at(0, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
     noise = sensor.noise_lsb if noise_lsb is None else noise_lsb
     # Weights 0 and 1 in floats: comparing into a bool and converting it is several times slower.
     valid = torch.sub(first.amplitude, noise, alpha=sensor.min_snr).ge_(0)
     valid.mul_(weights_of(~raw.saturated))
     if raw.shots == Shots.EIGHT:
-        second = decode(raw.dcs_lsb[:, SAMPLES_PER_FREQUENCY:], offset_lsb=offset_lsb)
+        second = decode_at(1, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
         merged_m, residual_m = unwrap_dual(
             first.phase_rad,
             second.phase_rad,
@@ -134,6 +141,29 @@ def correct(
     else:
         merged_m = _merged(first, prediction, sensor, merge)
     return _frame(merged_m, valid, first, prediction, sensor)
+
+
+def decode_at(
+    frequency: int,
+    raw: RawFrame,
+    sensor: SensorDescription,
+    *,
+    offset_lsb: Tensor | None = None,
+    shift_m: Tensor | None = None,
+) -> PhaseFrame:
+    """Phase and amplitude of the samples at f1 (0) or f2 (1), the stored wiggle removed.
+
+    `shift_m` [B] is added to the wrapped distances: minus the drift that a real sensor's
+    temperature tells; or what its compensation leaves, where samples are simulated without drift.
+    """
+    start = frequency * SAMPLES_PER_FREQUENCY
+    samples = raw.dcs_lsb[:, start : start + SAMPLES_PER_FREQUENCY]
+    frame = decode(samples, offset_lsb=offset_lsb)
+    if sensor.wiggle is not None:
+        frame = sensor.wiggle[frequency].corrected(frame)
+    if shift_m is not None:
+        frame = shifted(frame, shift_m, (sensor.f1_hz, sensor.f2_hz)[frequency])
+    return frame
 
 
 def _merged(

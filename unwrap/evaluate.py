@@ -11,10 +11,17 @@ from collections.abc import Mapping
 from torch import Tensor
 
 from unwrap.acquisition import Shots
-from unwrap.correction import MERGES, Merge, Prediction, SensorDescription, correct
+from unwrap.correction import (
+    MERGES,
+    Merge,
+    Prediction,
+    SensorDescription,
+    correct,
+    decode_at,
+)
 from unwrap.frames import RawFrame
 from unwrap.metrics import depth_metrics
-from unwrap.phase import decode, distance_m, unambiguous_range_m
+from unwrap.phase import distance_m, unambiguous_range_m
 
 Scores = dict[str, dict[str, float]]
 
@@ -28,6 +35,7 @@ def evaluate(
     *,
     offset_lsb: Tensor | None = None,
     noise_lsb: Tensor | float | None = None,
+    shift_m: Tensor | None = None,
 ) -> Scores:
     """Score the prediction alone and every method that the given acquisitions allow.
 
@@ -41,7 +49,7 @@ def evaluate(
         True distance, metres.
     scored : bool [B, H, W]
         Pixels that count, whether or not a method calls them valid.
-    offset_lsb, noise_lsb : optional
+    offset_lsb, noise_lsb, shift_m : optional
         As in `unwrap.correction.correct`.
 
     Returns
@@ -56,7 +64,8 @@ def evaluate(
     for shots, raw in raws.items():
         for name, merge in _methods(shots).items():
             if merge is None:
-                depth_m, valid = _wrap_0(raw, sensor, offset_lsb), ~raw.saturated
+                first = decode_at(0, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
+                depth_m, valid = distance_m(first.phase_rad, sensor.f1_hz), ~raw.saturated
             else:
                 frame = correct(
                     raw,
@@ -65,6 +74,7 @@ def evaluate(
                     merge=merge,
                     offset_lsb=offset_lsb,
                     noise_lsb=noise_lsb,
+                    shift_m=shift_m,
                 )
                 depth_m, valid = frame.distance_m, frame.valid
             share = float(valid[scored].double().mean())
@@ -77,10 +87,6 @@ def _methods(shots: Shots) -> dict[str, Merge | None]:
     if shots == Shots.EIGHT:
         return {"8 DCS": "nearest"}
     return {f"{shots:d} DCS wrap 0": None, **{f"{shots:d} DCS {rule}": rule for rule in MERGES}}
-
-
-def _wrap_0(raw: RawFrame, sensor: SensorDescription, offset_lsb: Tensor | None) -> Tensor:
-    return distance_m(decode(raw.dcs_lsb, offset_lsb=offset_lsb).phase_rad, sensor.f1_hz)
 
 
 def score(depth_m: Tensor, truth_m: Tensor, scored: Tensor, half_m: float) -> dict[str, float]:

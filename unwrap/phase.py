@@ -13,22 +13,13 @@ import torch
 from torch import Tensor
 
 from unwrap.frames import PhaseFrame
+from unwrap.frequencies import SPEED_OF_LIGHT_M_S, unambiguous_range_m
 
-SPEED_OF_LIGHT_M_S = 299_792_458.0
+__all__ = ["SPEED_OF_LIGHT_M_S", "TWO_PI", "decode", "distance_m", "unambiguous_range_m"]
+
 TWO_PI = 2 * math.pi
 BELOW_TWO_PI = float(np.nextafter(np.float32(TWO_PI), np.float32(0)))
 """Largest float32 phase of a period."""
-
-
-def unambiguous_range_m(frequency_hz: float) -> float:
-    """Distance after which the phase repeats: d_u = c / (2 f).
-
-    Examples
-    --------
-    >>> round(unambiguous_range_m(24e6), 4)
-    6.2457
-    """
-    return SPEED_OF_LIGHT_M_S / (2 * frequency_hz)
 
 
 def distance_m(phase_rad: Tensor, frequency_hz: float) -> Tensor:
