@@ -79,12 +79,13 @@ def _report(arguments: Namespace, results: dict[str, Any]) -> int:
 def problem(arguments: Namespace) -> int:
     """Measure the decision problem."""
     from agents.evaluation import drive_seeds
-    from agents.problem import measure_problem, print_problem
+    from agents.problem import check_solvable, measure_problem, print_problem
     from agents.study import make_ready
     from agents.tables import tabulate
     from shotenv.core import open_problem
 
     config = _experiment(arguments)
+    check_solvable(config.env.laser)  # before minutes are spent
     make_ready(config.env)
     counts = {"validation": config.study.tuning_drives, "test": config.study.drives}
     frames = sum(counts.values()) * config.env.frames_per_drive

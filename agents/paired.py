@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from agents.guard import ThermalGuard
 from agents.sb3_vector import Sb3VecEnv
 from shotenv.vector_env import ShotScheduleVectorEnv
 from unwrap.acquisition import Shots
@@ -26,14 +27,27 @@ class PairedVecEnv(Sb3VecEnv):
     ----------
     envs : ShotScheduleVectorEnv
         Made with `autoreset_mode="SameStep"`, best with `remember=True`.
+    guard : ThermalGuard
+        Stands between the learner and the laser, as it will when the scheduler is used.
     """
 
-    def __init__(self, envs: ShotScheduleVectorEnv) -> None:
+    def __init__(self, envs: ShotScheduleVectorEnv, guard: ThermalGuard) -> None:
         super().__init__(envs)
-        self._native = envs
+        self._native, self._guard = envs, guard
+        self._observed: np.ndarray | None = None
+
+    def reset(self) -> Any:
+        """Start all environments anew."""
+        self._observed = super().reset()
+        return self._observed
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Keep the actions that the guard allows for `step_wait`."""
+        super().step_async(self._guard(self._observed, actions))
 
     def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Step all environments with the kept actions."""
         usual = self._native.problem.config.reward.error * self._native.error_of(Shots.FOUR)
         observations, rewards, dones, infos = super().step_wait()
+        self._observed = observations
         return observations, np.maximum(rewards + usual, LOWEST).astype(np.float32), dones, infos

@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from agents.guard import ThermalGuard
 from shotenv.config import AgentConfig
+from shotenv.observe import feature_index
 from unwrap.acquisition import Shots
 
 if TYPE_CHECKING:
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
 Action = Any
 Observation = Any
 SNR_FEATURE: Final = "signal_to_noise"
-AGENT_SCHEMA: Final = 1
+AGENT_SCHEMA: Final = 2
 
 
 class Policy(ABC):
@@ -122,23 +124,43 @@ class SnrThresholdPolicy(Policy):
         return f"{self.below:d} DCS where {SNR_FEATURE} < {self.threshold:.3f}, else {self.above:d}"
 
 
+class GuardedPolicy(Policy):
+    """Another policy's choice, or fewer shots where these could trip the laser."""
+
+    def __init__(self, policy: Policy, guard: ThermalGuard) -> None:
+        self._policy, self._guard = policy, guard
+
+    def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
+        """What the guard makes of the policy's choice."""
+        return single(self._guard(observation, self._policy.act(observation, info)))
+
+    def reset(self) -> None:
+        """Start the policy anew."""
+        self._policy.reset()
+
+
 class PpoPolicy(Policy):
-    """A stable-baselines3 actor; the most probable action is taken.
+    """A stable-baselines3 actor behind a thermal guard; the most probable action is taken.
 
     Saved as a folder of `policy.safetensors` and `agent.json`; nothing is ever unpickled.
     """
 
     def __init__(
-        self, network: ActorCriticPolicy, config: AgentConfig, feature_names: Sequence[str]
+        self, network: ActorCriticPolicy, config: AgentConfig, guard: ThermalGuard
     ) -> None:
         self.network = network
         self.config = config
-        self.feature_names = tuple(feature_names)
+        self.guard = guard
+
+    @property
+    def feature_names(self) -> tuple[str, ...]:
+        """Names of the observation's elements."""
+        return self.guard.feature_names
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
-        """The most probable action under the network."""
+        """The most probable action under the network, if the guard allows it."""
         action, _ = self.network.predict(observation, deterministic=True)
-        return single(np.asarray(action, dtype=np.int64))
+        return single(self.guard(observation, np.asarray(action, dtype=np.int64)))
 
     def save(self, folder: Path) -> None:
         """Write `policy.safetensors`, then `agent.json`, each atomically."""
@@ -156,6 +178,7 @@ class PpoPolicy(Policy):
             "schema": AGENT_SCHEMA,
             "agent": self.config.model_dump(mode="json"),
             "feature_names": list(self.feature_names),
+            "guard_needed_k": list(self.guard.needed_k),
             "versions": {name: version(name) for name in ("stable-baselines3", "torch")},
         }
 
@@ -172,14 +195,14 @@ class PpoPolicy(Policy):
 
         description = _read_description(folder / "agent.json")
         config = AgentConfig.model_validate(description["agent"])
-        names = description["feature_names"]
-        network = build_network(len(names), config)
+        guard = ThermalGuard(description["feature_names"], description["guard_needed_k"])
+        network = build_network(len(guard.feature_names), config)
         weights = folder / "policy.safetensors"
         try:
             network.load_state_dict(load_file(weights))
         except Exception as error:  # safetensors has an error type of its own per fault
             raise ValueError(f"{weights} is not a usable network: {first_line(error)}") from None
-        return cls(network, config, names)
+        return cls(network, config, guard)
 
 
 def build_network(features: int, config: AgentConfig) -> ActorCriticPolicy:
@@ -198,19 +221,6 @@ def build_network(features: int, config: AgentConfig) -> ActorCriticPolicy:
 def network_arguments(config: AgentConfig) -> dict[str, Any]:
     """What PPO and `build_network` both need to make the same network."""
     return {"net_arch": list(config.hidden)}
-
-
-def feature_index(feature_names: Sequence[str], name: str) -> int:
-    """Place of the feature `name` in an observation.
-
-    Raises
-    ------
-    ValueError
-        There is no such feature.
-    """
-    if name not in feature_names:
-        raise ValueError(f"feature_names has no {name!r}; it has {', '.join(feature_names)}")
-    return list(feature_names).index(name)
 
 
 def checked_shots(shots: int) -> Shots:

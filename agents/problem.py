@@ -25,7 +25,7 @@ from agents.optimum import (
 )
 from agents.statistics import excess, interval, mean
 from agents.tables import Possible
-from shotenv.config import RewardConfig, StudyConfig
+from shotenv.config import LaserConfig, RewardConfig, StudyConfig
 
 SHOTS: Final = (2, 4, 8)
 GOALS: Final = {
@@ -49,6 +49,21 @@ def describe_rule(rule: Rule) -> str:
     return f"{below} DCS where signal_to_noise < {rule.limit:.3f}, else {above}"
 
 
+def check_solvable(laser: LaserConfig) -> None:
+    """Refuse a laser for which the optimum cannot be computed.
+
+    Raises
+    ------
+    ValueError
+        Derating makes what is measured depend on the laser's temperature.
+    """
+    if laser.derate_per_k:
+        raise ValueError(
+            f"derate_per_k of laser {laser.name} is {laser.derate_per_k:g}; expected 0: the "
+            "optimum does not know what a derated laser would measure"
+        )
+
+
 def measure_problem(
     validation: Possible, test: Possible, weights: RewardConfig, study: StudyConfig
 ) -> dict[str, Any]:
@@ -63,11 +78,17 @@ def measure_problem(
     study : StudyConfig
         Bootstrap draws and confidence.
 
+    Raises
+    ------
+    ValueError
+        The laser is derated.
+
     Notes
     -----
     The best fixed and the best blind choice are picked on the test drives themselves, which
     favours them; the rule is tuned on the validation drives.
     """
+    check_solvable(test.problem.config.laser)
     table = test.table(weights)
     best = clairvoyant(table)
     rivals = _rivals(validation.table(weights), table)

@@ -13,6 +13,7 @@ from agents.results import Strip
 from agents.tables import drive_of
 from shotenv.core import Problem
 from shotenv.drive import Drive
+from shotenv.laser import emitted_power_w
 from shotenv.measure import acquire_depth
 from unwrap.acquisition import SAMPLES_PER_FREQUENCY, Shots
 from unwrap.phase import decode, distance_m, unambiguous_range_m
@@ -25,7 +26,14 @@ def take_strip(problem: Problem, played: Played) -> Strip:
     chosen = list(_runs(played))
     drives = {i: drive_of(problem, int(played.seeds[i])) for i, _ in chosen}
     images = [
-        _images(problem, drives[i], frame, int(played.shots[i, frame])) for i, frame in chosen
+        _images(
+            problem,
+            drives[i],
+            frame,
+            int(played.shots[i, frame]),
+            _power_w(problem, drives[i], played, i, frame),
+        )
+        for i, frame in chosen
     ]
     where = tuple(np.array(chosen).T)
     return Strip(
@@ -60,9 +68,18 @@ def _run(played: Played, drive: int, start: int, family: str) -> list[tuple[int,
     return [(drive, frame) for frame in range(start, end)]
 
 
-def _images(problem: Problem, drive: Drive, frame: int, shots: int) -> dict[str, np.ndarray]:
+def _power_w(problem: Problem, drive: Drive, played: Played, row: int, frame: int) -> Tensor:
+    """The laser's power in a frame, after derating."""
+    told_k = torch.tensor(played.temperature_k[[row], max(frame - 1, 0)])
+    start_k = told_k if frame else drive.start_k
+    return emitted_power_w(drive.laser_power_w, start_k, problem.config.laser)
+
+
+def _images(
+    problem: Problem, drive: Drive, frame: int, shots: int, power_w: Tensor
+) -> dict[str, np.ndarray]:
     step = torch.tensor([frame])
-    made = acquire_depth(problem, drive, step, Shots(shots))
+    made = acquire_depth(problem, drive, step, Shots(shots), power_w)
     offset = drive.offsets.calibrated_lsb if shots == Shots.TWO else None
     first = decode(made.raw.dcs_lsb[:, :SAMPLES_PER_FREQUENCY], offset_lsb=offset)
     return {

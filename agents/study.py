@@ -19,6 +19,8 @@ from agents.evaluation import (
 )
 from agents.policies import (
     CyclePolicy,
+    FixedPolicy,
+    GuardedPolicy,
     Policy,
     PpoPolicy,
     RandomPolicy,
@@ -39,6 +41,7 @@ from shotenv.progress import progress, say
 from unwrap.files import write_json
 
 if TYPE_CHECKING:
+    from agents.guard import ThermalGuard
     from shotenv.vector_env import ShotScheduleVectorEnv
 
 SCHEDULER: Final = "ppo"
@@ -82,8 +85,18 @@ def train_scheduler(config: DemoConfig, out: Path) -> PpoPolicy:
     def validate(policy: PpoPolicy) -> float:
         return float(play_drives(policy, judges, seeds).reward.sum(axis=1).mean())
 
-    names, frames = envs.feature_names, config.env.frames_per_drive
-    return Trainer(PairedVecEnv(envs), names, frames, config.agent, validate, out).run()
+    guard = thermal_guard(config)
+    paired, frames = PairedVecEnv(envs, guard), config.env.frames_per_drive
+    return Trainer(paired, guard, frames, config.agent, validate, out).run()
+
+
+def thermal_guard(config: DemoConfig) -> ThermalGuard:
+    """The guard of `config`: `agent.guard` times the most that a frame can warm the laser by."""
+    from agents.guard import ThermalGuard, largest_rises_k
+    from shotenv.observe import FEATURES
+
+    needed_k = [config.agent.guard * rise_k for rise_k in largest_rises_k(config.env)]
+    return ThermalGuard(tuple(FEATURES), needed_k)
 
 
 def tune_rule(config: DemoConfig) -> SnrThresholdPolicy:
@@ -109,6 +122,7 @@ def baselines(config: DemoConfig) -> dict[str, Policy]:
         "snr_threshold": tune_rule(config),
         "cycle": CyclePolicy(4, shots=8, otherwise=2),
         "random": RandomPolicy(config.study.seed),
+        "always_8_guarded": GuardedPolicy(FixedPolicy(8), thermal_guard(config)),
         **FIXED,
     }
 

@@ -40,7 +40,10 @@ class Possible:
     outcomes: tuple[Outcomes, ...]
 
     def table(self, weights: RewardConfig) -> DriveTable:
-        """The table that choices are played on, with these reward weights."""
+        """The table that choices are played on, with these reward weights.
+
+        Nothing derates the laser in it.
+        """
         period_s, laser = self.problem.frame_period_s, self.problem.config.laser
         ambient_k = np.array([float(drive.ambient_k) for drive in self.drives])
         heat_j = self._stacked(lambda one: one.heat_j[0])

@@ -24,6 +24,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.utils import set_random_seed
 from tqdm import tqdm
 
+from agents.guard import ThermalGuard
 from agents.policies import PpoPolicy, first_line, network_arguments
 from agents.sb3_vector import Sb3VecEnv
 from shotenv.config import AgentConfig
@@ -51,8 +52,8 @@ class Trainer:
     ----------
     envs : Sb3VecEnv
         `config.num_envs` environments.
-    feature_names : tuple of str
-        Names of the observation's elements.
+    guard : ThermalGuard
+        Stands between network and laser.
     frames_per_drive : int
         Length of an episode; a round lasts at least that long.
     config : AgentConfig
@@ -71,7 +72,7 @@ class Trainer:
     def __init__(
         self,
         envs: Sb3VecEnv,
-        feature_names: tuple[str, ...],
+        guard: ThermalGuard,
         frames_per_drive: int,
         config: AgentConfig,
         validate: Validate,
@@ -79,14 +80,18 @@ class Trainer:
     ) -> None:
         self._envs, self._config, self._validate, self._out = envs, config, validate, out
         self._ppo = build_ppo(envs, config)
-        self.policy = PpoPolicy(self._ppo.policy, config, feature_names)
+        self.policy = PpoPolicy(self._ppo.policy, config, guard)
         self._drives = np.random.SeedSequence(config.seed).generate_state(config.drives)
         self._few = config.drives < config.num_envs
         updates = math.ceil(frames_per_drive / config.rollout_steps)
         self._round_steps = updates * config.rollout_steps * config.num_envs
         self._rounds = math.ceil(config.total_steps / self._round_steps)
         self._identity = json.dumps(
-            {"agent": config.model_dump(mode="json"), "features": list(feature_names)}
+            {
+                "agent": config.model_dump(mode="json"),
+                "features": list(guard.feature_names),
+                "guard_needed_k": list(guard.needed_k),
+            }
         )
 
     def run(self) -> PpoPolicy:

@@ -17,11 +17,12 @@ import torch
 from torch import Tensor
 
 from shotenv.batch import concatenate, put, take
+from shotenv.config import ROOM_K
 from shotenv.drive import Drive, draw_drive
 from shotenv.frames import ShotCost
-from shotenv.laser import shot_cost, thermal_step, trip_step
+from shotenv.laser import LaserState, emitted_power_w, laser_step, shot_cost, start_laser
 from shotenv.measure import Measured, measure, noise_of
-from shotenv.observe import FEATURES, LIMIT, SEEN_FEATURES, gray_change
+from shotenv.observe import FEATURES, LIMIT, SEEN_FEATURES, gray_change, heat_margin
 from shotenv.problem import Problem, open_problem
 from shotenv.reward import DepthScore, no_depth, reward, reward_terms
 from unwrap.acquisition import Shots
@@ -34,8 +35,8 @@ NEVER = 1000
 """Frames since an acquisition that has not been made."""
 RECENT_S = 1.0
 """Time constant of the averages of duty and power."""
-Look = Callable[[Problem, Drive, Tensor, Shots], Measured]
-"""Acquires the frames at a step of some drives."""
+Look = Callable[[Problem, Drive, Tensor, Shots, Tensor | None], Measured]
+"""Acquires the frames at a step of some drives, with a laser power or the drives' own."""
 
 
 @dataclass(frozen=True)
@@ -71,16 +72,13 @@ class State:
     drive : Drive
     step : int64 [B]
         Frames played.
-    temperature_k : float64 [B]
-    tripped : bool [B]
-        The laser is off in the coming frame.
+    laser : LaserState
     seen : Seen
     """
 
     drive: Drive
     step: Tensor
-    temperature_k: Tensor
-    tripped: Tensor
+    laser: LaserState
     seen: Seen
 
 
@@ -123,8 +121,7 @@ def reset(problem: Problem, seeds: Sequence[int]) -> State:
     return State(
         drive=drive,
         step=none,
-        temperature_k=drive.start_k,
-        tripped=none.bool(),
+        laser=start_laser(drive.start_k),
         seen=Seen(
             features=torch.zeros(len(seeds), len(SEEN_FEATURES)),
             shots=none,
@@ -149,10 +146,11 @@ def step(
     look : callable
         `measure`, or something that gives the same faster (`shotenv.recall`).
     """
-    shots = SHOTS_OF_ACTION.take(actions).masked_fill(state.tripped, 0)
+    tripped = state.laser.tripped
+    shots = SHOTS_OF_ACTION.take(actions).masked_fill(tripped, 0)
     score, features = _measure_by_shots(problem, state, shots, look)
-    cost = cost_of(problem, state.drive, shots)
-    terms = reward_terms(score, cost, state.drive.always_eight, state.tripped)
+    cost = cost_of(problem, state.drive, shots, state.laser.temperature_k)
+    terms = reward_terms(score, cost, state.drive.always_eight, tripped)
     following = advance(problem, state, cost, _remember(problem, state, shots, terms, features))
     outcome = Outcome(
         reward=reward(terms, problem.config.reward),
@@ -160,7 +158,7 @@ def step(
         shots=shots,
         score=score,
         cost=cost,
-        tripped=state.tripped,
+        tripped=tripped,
         truncated=following.step >= problem.config.frames_per_drive,
     )
     return following, outcome
@@ -171,22 +169,32 @@ def _measure_by_shots(
 ) -> tuple[DepthScore, Tensor]:
     """Scores and remembered features; environments with the same shots are one batch."""
     features, counts = state.seen.features, sorted(set(shots.tolist()))
+    power_w = derated_w(problem, state)
     if len(counts) == 1 and counts[0]:
-        return _look_as(Shots(counts[0]), problem, state.drive, state.step, features, look)
+        return _look_as(Shots(counts[0]), problem, state.drive, state.step, power_w, features, look)
     score = no_depth(len(shots), problem.config.sensor.max_range_m)
     for count in counts:
         if count:
             rows = (shots == count).nonzero().squeeze(1)
             drive, before = take(state.drive, rows), features[rows]
-            part, told = _look_as(Shots(count), problem, drive, state.step[rows], before, look)
+            power = None if power_w is None else power_w[rows]
+            part, told = _look_as(
+                Shots(count), problem, drive, state.step[rows], power, before, look
+            )
             score, features = put(score, rows, part), put(features, rows, told)
     return score, features
 
 
 def _look_as(
-    shots: Shots, problem: Problem, drive: Drive, step: Tensor, features: Tensor, look: Look
+    shots: Shots,
+    problem: Problem,
+    drive: Drive,
+    step: Tensor,
+    power_w: Tensor | None,
+    features: Tensor,
+    look: Look,
 ) -> tuple[DepthScore, Tensor]:
-    measured = look(problem, drive, step, shots)
+    measured = look(problem, drive, step, shots, power_w)
     return measured.score, keep_untold(measured.seen, features, shots)
 
 
@@ -196,12 +204,22 @@ def keep_untold(new: Tensor, old: Tensor, shots: Shots) -> Tensor:
     return torch.cat((new[:, :told], old[:, told:]), dim=1)
 
 
-def cost_of(problem: Problem, drive: Drive, shots: Tensor) -> ShotCost:
-    """Energy, duty and heat of `shots` [B] with each drive's laser."""
+def derated_w(problem: Problem, state: State) -> Tensor | None:
+    """Optical power [B] while on, W; None is the drive's own, where nothing derates it."""
+    laser = problem.config.laser
+    if not laser.derate_per_k:
+        return None
+    return emitted_power_w(state.drive.laser_power_w, state.laser.temperature_k, laser)
+
+
+def cost_of(problem: Problem, drive: Drive, shots: Tensor, temperature_k: Tensor) -> ShotCost:
+    """What `shots` [B] cost with each drive's laser at a junction temperature [B]."""
+    laser = problem.config.laser
     return shot_cost(
         shots,
-        problem.config.laser,
-        optical_power_w=drive.laser_power_w,
+        laser,
+        optical_power_w=emitted_power_w(drive.laser_power_w, temperature_k, laser),
+        temperature_k=temperature_k,
         integration_s=drive.integration_s,
         frame_period_s=problem.frame_period_s,
         network_macs=problem.network_macs,
@@ -224,20 +242,18 @@ def _remember(
 
 def advance(problem: Problem, state: State, cost: ShotCost, seen: Seen) -> State:
     """The laser's heat, and the next frame."""
-    laser = problem.config.laser
-    temperature_k = thermal_step(
-        state.temperature_k, cost.heat_j, state.drive.ambient_k, laser, problem.frame_period_s
-    )
-    tripped = trip_step(state.tripped, temperature_k, laser)
-    return State(state.drive, state.step + 1, temperature_k, tripped, seen)
+    config, ambient_k = problem.config.laser, state.drive.ambient_k
+    laser = laser_step(state.laser, cost, ambient_k, config, problem.frame_period_s)
+    return State(state.drive, state.step + 1, laser, seen)
 
 
 @torch.inference_mode()
 def observe(problem: Problem, state: State) -> Tensor:
     """Features float32 [B, len(FEATURES)] in [-LIMIT, LIMIT], in the order of `FEATURES`."""
     drive, seen, laser = state.drive, state.seen, problem.config.laser
+    temperature_k, tripped = state.laser.temperature_k, state.laser.tripped
     now, before = drive.frame(state.step), drive.frame((state.step - 1).clamp(min=0))
-    margin_k = torch.where(state.tripped, laser.release_k, laser.trip_k) - state.temperature_k
+    margin_k = torch.where(tripped, laser.release_k, laser.trip_k) - temperature_k
     columns = (
         gray_change(problem.scenes, before, now),
         seen.shots == Shots.TWO,
@@ -245,8 +261,8 @@ def observe(problem: Problem, state: State) -> Tensor:
         seen.shots == Shots.EIGHT,
         1.0 - torch.exp(seen.since_four / -16.0),
         1.0 - torch.exp(seen.since_eight / -16.0),
-        (state.temperature_k - laser.release_k) / 20.0,
-        margin_k.sign() * margin_k.abs().log1p() / 3.0,
+        (temperature_k - laser.release_k) / 20.0,
+        heat_margin(margin_k),
         seen.duty,
         seen.power,
         1.0 - state.step * (2.0 / problem.config.frames_per_drive),
@@ -259,7 +275,7 @@ def observe(problem: Problem, state: State) -> Tensor:
 
 @dataclass(frozen=True)
 class Outcomes:
-    """What each action would bring in each frame of one drive, with a working laser.
+    """What each action would bring in each frame of one drive, with a working laser at 25 C.
 
     Attributes
     ----------
@@ -291,10 +307,11 @@ def outcomes_of_all_actions(problem: Problem, drive: Drive) -> Outcomes:
     measured = [_measure_all(problem, drive, step.unsqueeze(0)) for step in steps]
     score = _stack([m.score for m in measured], len(steps))
     features = torch.cat([m.seen for m in measured]).unflatten(0, (len(steps), 3))
-    cost = cost_of(problem, drive, SHOTS_OF_ACTION)
+    room_k = torch.full_like(drive.ambient_k, ROOM_K)
+    cost = cost_of(problem, drive, SHOTS_OF_ACTION, room_k)
     working = torch.zeros(len(steps), 3, dtype=torch.bool)
     terms = reward_terms(score, cost, drive.always_eight, working)
-    off = cost_of(problem, drive, torch.zeros(1, dtype=torch.int64))
+    off = cost_of(problem, drive, torch.zeros(1, dtype=torch.int64), room_k)
     lost = no_depth(1, problem.config.sensor.max_range_m)
     tripped_terms = reward_terms(lost, off, drive.always_eight, torch.ones(1, dtype=torch.bool))
     everywhere = {name: value.expand(len(steps), 3) for name, value in terms.items()}
@@ -311,8 +328,10 @@ def outcomes_of_all_actions(problem: Problem, drive: Drive) -> Outcomes:
 
 def _measure_all(problem: Problem, drive: Drive, step: Tensor) -> Measured:
     """All three acquisitions of one frame; they share the noise of the longest."""
-    noise = list(islice(noise_of(drive, step, problem.bank.height, problem.bank.width), Shots.EIGHT))
-    return concatenate([measure(problem, drive, step, shots, noise) for shots in Shots])
+    noise = list(
+        islice(noise_of(drive, step, problem.bank.height, problem.bank.width), Shots.EIGHT)
+    )
+    return concatenate([measure(problem, drive, step, shots, noise=noise) for shots in Shots])
 
 
 def _stack(scores: Sequence[DepthScore], frames: int) -> DepthScore:

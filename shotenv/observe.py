@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -54,6 +55,30 @@ STATE_FEATURES: Mapping[str, str] = {
 }
 FEATURES: Mapping[str, str] = {**SCENE_FEATURES, **SEEN_FEATURES, **STATE_FEATURES}
 """Name and meaning of each element of the observation, in order."""
+
+
+def feature_index(feature_names: Sequence[str], name: str) -> int:
+    """Place of the feature `name` in an observation.
+
+    Raises
+    ------
+    ValueError
+        There is no such feature.
+    """
+    if name not in feature_names:
+        raise ValueError(f"feature_names has no {name!r}; it has {', '.join(feature_names)}")
+    return list(feature_names).index(name)
+
+
+def heat_margin(margin_k: Tensor) -> Tensor:
+    """Feature `heat_margin` of a margin in kelvin, fine near 0: a frame warms by tenths of one."""
+    return margin_k.sign() * margin_k.abs().log1p() / 3.0
+
+
+def heat_margin_k(feature: np.ndarray) -> np.ndarray:
+    """Margin in kelvin that the feature `heat_margin` stands for."""
+    return np.sign(feature) * np.expm1(3.0 * np.abs(feature))
+
 
 LIMIT = 2.0
 """Observations are clipped to +-LIMIT."""

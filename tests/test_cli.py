@@ -127,7 +127,8 @@ def test_demo_does_the_main_job(capsys, tmp_path, tiny):
     results = json.loads((out / "results.json").read_text())
     assert results == json.loads((tmp_path / "n.json").read_text())
     assert set(results["policies"]) == {
-        *("ppo", "snr_threshold", "cycle", "random", "always_2", "always_4", "always_8")
+        *("ppo", "snr_threshold", "cycle", "random"),
+        *("always_2", "always_4", "always_8", "always_8_guarded"),
     }
     for policy in results["policies"].values():
         assert set(policy["return"]) == {"mean", "low", "high"}

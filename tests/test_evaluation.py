@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from agents.evaluation import FIXED, Played, best_fixed, difference, play_drives, summary
+from agents.guard import ThermalGuard
 from agents.optimum import clairvoyant, play, threshold
-from agents.policies import FixedPolicy, RandomPolicy, SnrThresholdPolicy
+from agents.policies import FixedPolicy, PpoPolicy, RandomPolicy, SnrThresholdPolicy
 from agents.problem import measure_problem, tuned_rule
 from agents.strip import take_strip
 from agents.study import evaluate_scheduler, make_envs, play_all, train_scheduler, tune_rule
@@ -160,6 +161,8 @@ def test_train_and_evaluate_write_everything_the_report_needs(config, tmp_path):
     assert "PPO scheduler" in page and str(results["drives"]) in page
     written = {path.name for path in tmp_path.iterdir()}
     assert written >= {"results.json", "drives.csv", "timeline.json", "frames.npz", "report.html"}
-    other = type(scheduler)(scheduler.network, scheduler.config, ("gray_mean",))
+    other = PpoPolicy(
+        scheduler.network, scheduler.config, ThermalGuard(("heat_margin",), (0, 0, 0))
+    )
     with pytest.raises(ValueError, match="other features"):
         evaluate_scheduler(config, other, tmp_path)

@@ -5,20 +5,24 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from agents.guard import ThermalGuard
 from agents.paired import LOWEST, PairedVecEnv
 from agents.sb3_vector import Sb3VecEnv
+from shotenv.observe import FEATURES
 from shotenv.vector_env import ShotScheduleVectorEnv
 
 DRIVES = 3
+OPEN = ThermalGuard(tuple(FEATURES), (-1e3, -1e3, -1e3))
+CLOSED = ThermalGuard(tuple(FEATURES), (1e3, 1e3, 1e3))
 
 
 @pytest.fixture
 def make(tiny_kwargs):
-    def make(adapter):
+    def make(adapter, guard=OPEN):
         envs = ShotScheduleVectorEnv(
             DRIVES, autoreset_mode="SameStep", remember=True, **{**tiny_kwargs, "split": "all"}
         )
-        adapted = adapter(envs)
+        adapted = PairedVecEnv(envs, guard) if adapter is PairedVecEnv else adapter(envs)
         adapted.seed_all(range(DRIVES))
         adapted.reset()
         return adapted
@@ -49,3 +53,10 @@ def test_differences_between_choices_are_those_of_the_true_reward(make):
 def test_reward_has_a_floor(make):
     rewards = play(make(PairedVecEnv), np.full((6, DRIVES), 2))
     assert rewards.min() >= LOWEST
+
+
+def test_guard_stands_between_learner_and_laser(make):
+    asked, least = np.full((4, DRIVES), 2), np.zeros((4, DRIVES), dtype=np.int64)
+    np.testing.assert_array_equal(
+        play(make(PairedVecEnv, CLOSED), asked), play(make(PairedVecEnv), least)
+    )

@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from agents.guard import ThermalGuard
 from agents.policies import (
     CyclePolicy,
     FixedPolicy,
@@ -15,6 +16,7 @@ from agents.policies import (
 from shotenv.config import AgentConfig
 
 NAMES = ("gray_mean", "signal_to_noise", "time_left")
+GUARD = ThermalGuard(("gray_mean", "signal_to_noise", "heat_margin"), (0.0, 0.1, 0.4))
 ONE, BATCH = np.zeros(3, np.float32), np.zeros((5, 3), np.float32)
 
 
@@ -54,12 +56,12 @@ def test_threshold_compares_the_named_feature():
 
 def test_saved_scheduler_decides_the_same(tmp_path: Path):
     config = AgentConfig(hidden=(8,))
-    policy = PpoPolicy(build_network(3, config), config, NAMES)
+    policy = PpoPolicy(build_network(3, config), config, GUARD)
     policy.save(tmp_path / "agent")
     loaded = PpoPolicy.load(tmp_path / "agent")
     observation = np.random.default_rng(0).normal(size=(64, 3)).astype(np.float32) * 10
     np.testing.assert_array_equal(policy.act(observation), loaded.act(observation))
-    assert loaded.config == config and loaded.feature_names == NAMES
+    assert loaded.config == config and loaded.feature_names == GUARD.feature_names
     assert isinstance(loaded.act(observation[0]), int)
 
 
@@ -76,7 +78,7 @@ def test_missing_and_damaged_schedulers_are_named(tmp_path: Path):
     with pytest.raises(ValueError, match=r"agent\.json is missing"):
         PpoPolicy.load(tmp_path)
     config = AgentConfig(hidden=(8,))
-    PpoPolicy(build_network(3, config), config, NAMES).save(tmp_path)
+    PpoPolicy(build_network(3, config), config, GUARD).save(tmp_path)
     (tmp_path / "policy.safetensors").write_bytes(b"\x80\x04not tensors")
     with pytest.raises(ValueError, match=r"policy\.safetensors is not a usable network"):
         PpoPolicy.load(tmp_path)
