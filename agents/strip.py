@@ -15,8 +15,9 @@ from shotenv.core import Problem
 from shotenv.drive import Drive
 from shotenv.laser import emitted_power_w
 from shotenv.measure import acquire_depth
-from unwrap.acquisition import SAMPLES_PER_FREQUENCY, Shots
-from unwrap.phase import decode, distance_m, unambiguous_range_m
+from unwrap.acquisition import Shots
+from unwrap.correction import decode_at
+from unwrap.phase import distance_m, unambiguous_range_m
 
 FRAMES_PER_FAMILY = 8
 
@@ -81,7 +82,7 @@ def _images(
     step = torch.tensor([frame])
     made = acquire_depth(problem, drive, step, Shots(shots), power_w)
     offset = drive.offsets.calibrated_lsb if shots == Shots.TWO else None
-    first = decode(made.raw.dcs_lsb[:, :SAMPLES_PER_FREQUENCY], offset_lsb=offset)
+    first = decode_at(0, made.raw, problem.description, offset_lsb=offset, shift_m=drive.drift_m)
     return {
         "gray_lsb": problem.bank.gray(drive.frame(step))[0].numpy(),
         "wrapped_m": _half(distance_m(first.phase_rad[0], problem.config.sensor.f1_hz)),

@@ -17,6 +17,7 @@ import torch
 
 from shotenv.bank.store import write_clip, write_manifest
 from shotenv.core import open_problem, reset, step
+from shotenv.laser import start_laser
 from shotenv.resolve import env_config
 from shotenv.sensor import noise_samples
 from shotenv.vector_env import ShotScheduleVectorEnv
@@ -79,8 +80,8 @@ def single(fields: dict[str, object], shots: Shots) -> dict:
     pixels = torch.randn(2, HEIGHT, WIDTH)
 
     def play() -> None:
-        cold = state["now"].drive.start_k
-        state["now"], _ = step(problem, replace(state["now"], temperature_k=cold), action)
+        cold = start_laser(state["now"].drive.start_k)
+        state["now"], _ = step(problem, replace(state["now"], laser=cold), action)
 
     def least() -> None:
         for _ in islice(noise_samples([0], [0], HEIGHT, WIDTH), shots):

@@ -7,12 +7,13 @@ import torch
 from PIL import Image, ImageDraw
 from torch import Tensor
 
-from shotenv.core import State
+from shotenv.core import State, derated_w
 from shotenv.measure import acquire_depth
 from shotenv.problem import Problem
 from shotenv.sensor.converter import full_scale_lsb
-from unwrap.acquisition import SAMPLES_PER_FREQUENCY, Shots
-from unwrap.phase import decode, distance_m, unambiguous_range_m
+from unwrap.acquisition import Shots
+from unwrap.correction import decode_at
+from unwrap.phase import distance_m, unambiguous_range_m
 
 PANELS = ("gray", "wrapped", "corrected", "truth", "error")
 CAPTION_PX = 14
@@ -42,7 +43,7 @@ def draw_frame(problem: Problem, state: State, shots: int) -> np.ndarray:
     drive and the frame, so the picture shows exactly what the step saw.
     """
     panels = frame_panels(problem, state, shots)
-    temperature_c = float(state.temperature_k) - 273.15
+    temperature_c = float(state.laser.temperature_k) - 273.15
     laser = f"{shots} DCS" if shots else "no laser"
     caption = f"frame {int(state.step)}   {laser}   {temperature_c:.1f} C"
     return _framed([panels[name] for name in PANELS], caption)
@@ -58,9 +59,11 @@ def frame_panels(problem: Problem, state: State, shots: int) -> dict[str, np.nda
     black = torch.full_like(truth_m, torch.nan)
     wrapped_m, corrected_m, error_m = black, black, black
     if shots:
-        made = acquire_depth(problem, drive, state.step, Shots(shots))
+        made = acquire_depth(problem, drive, state.step, Shots(shots), derated_w(problem, state))
         offset = drive.offsets.calibrated_lsb if shots == Shots.TWO else None
-        first = decode(made.raw.dcs_lsb[:, :SAMPLES_PER_FREQUENCY], offset_lsb=offset)
+        first = decode_at(
+            0, made.raw, problem.description, offset_lsb=offset, shift_m=drive.drift_m
+        )
         wrapped_m = distance_m(first.phase_rad[0], sensor.f1_hz)
         corrected_m = torch.where(made.depth.valid[0], made.depth.distance_m[0], torch.nan)
         error_m = torch.where(made.scored[0] > 0, (corrected_m - truth_m).abs(), torch.nan)

@@ -45,7 +45,8 @@ class Drive:
     drift_m : float64 [B]
         What the imager's temperature adds to every distance, compensation included, metres.
     always_eight : ShotCost
-        What a frame of eight samples costs with this laser and integration time.
+        Most that a frame of eight samples costs with this laser and integration time: at its full
+        power, about to trip.
     """
 
     seed: Tensor
@@ -98,6 +99,7 @@ def draw_drive(
             torch.tensor([int(Shots.EIGHT)]),
             config.laser,
             optical_power_w=laser_power_w,
+            temperature_k=torch.full_like(laser_power_w, config.laser.trip_k),
             integration_s=integration_s,
             frame_period_s=1.0 / config.frame_rate_hz,
             network_macs=0,

@@ -38,6 +38,16 @@ class Exposure:
         )
 
 
+ENERGY_PARTS = (
+    "laser_energy_j",
+    "driver_energy_j",
+    "readout_energy_j",
+    "static_energy_j",
+    "network_energy_j",
+)
+"""Where the energy of a frame goes; fields of `ShotCost`."""
+
+
 @dataclass(frozen=True)
 class ShotCost:
     """What an acquisition of each environment in the batch costs; float64 [B] each.

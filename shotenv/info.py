@@ -9,6 +9,8 @@ import numpy as np
 import torch
 
 from shotenv.core import Outcome, State
+from shotenv.frames import ENERGY_PARTS
+from shotenv.laser import too_bright
 from shotenv.problem import Problem
 from shotenv.reward import TERMS
 
@@ -21,7 +23,7 @@ def reset_infos(problem: Problem, state: State) -> list[dict[str, Any]]:
         "laser_power_w": drive.laser_power_w.tolist(),
         "integration_s": drive.integration_s.tolist(),
         "ambient_k": drive.ambient_k.tolist(),
-        "temperature_k": state.temperature_k.tolist(),
+        "temperature_k": state.laser.temperature_k.tolist(),
         "family": _families(problem, state),
     }
     return _rows(columns)
@@ -32,19 +34,23 @@ def step_infos(
 ) -> list[dict[str, Any]]:
     """What is told of each frame that was played.
 
-    `cost` is the constraint violation: 1 in a frame without laser. `vector_reward` holds the
-    unweighted `reward_terms` in the order of `reward.TERMS`.
+    `cost` is the constraint violation: 1 in a frame without laser, or after which the light
+    averaged for eye safety exceeds its cap. `vector_reward` holds the unweighted `reward_terms` in
+    the order of `reward.TERMS`.
     """
-    cost, score = outcome.cost, outcome.score
+    cost, score, laser = outcome.cost, outcome.score, problem.config.laser
+    violated = outcome.tripped | too_bright(after.laser, laser)
     columns = {
         "shots": outcome.shots.tolist(),
         "energy_j": cost.energy_j.tolist(),
-        "laser_energy_j": cost.laser_energy_j.tolist(),
+        **{name: getattr(cost, name).tolist() for name in ENERGY_PARTS},
         "duty": cost.duty.tolist(),
         "power_w": (cost.energy_j / problem.frame_period_s).tolist(),
-        "temperature_k": after.temperature_k.tolist(),
+        "temperature_k": after.laser.temperature_k.tolist(),
+        "life_used_h": cost.life_used_h.tolist(),
+        "eye_power_w": after.laser.eye_power_w.tolist(),
         "tripped": outcome.tripped.tolist(),
-        "cost": outcome.terms["tripped"].tolist(),
+        "cost": violated.double().tolist(),
         "family": _families(problem, before),
     }
     fields = [field.name for field in dataclasses.fields(score) if field.name != "error"]

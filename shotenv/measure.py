@@ -74,17 +74,26 @@ def noise_of(drive: Drive, step: Tensor, height: int, width: int) -> Iterator[Te
 
 
 def acquire_depth(
-    problem: Problem, drive: Drive, step: Tensor, shots: Shots, noise: Iterable[Tensor] | None = None
+    problem: Problem,
+    drive: Drive,
+    step: Tensor,
+    shots: Shots,
+    power_w: Tensor | None = None,
+    *,
+    noise: Iterable[Tensor] | None = None,
 ) -> Acquisition:
     """Acquire and correct the frames at `step` [B] of `drive` with `shots` samples each.
 
-    `noise` gives the normals [B, 2, H, W] of each sample; None draws the drive's own.
+    `power_w` [B] is the laser's power while on where it is not the drive's own; `noise` gives the
+    normals [B, 2, H, W] of each sample, and None draws the drive's own.
     """
     bank, sensor, frames = problem.bank, problem.config.sensor, drive.frame(step)
     if noise is None:
         noise = noise_of(drive, step, bank.height, bank.width)
     exposure = bank.exposure(frames)
-    electrons = collect(exposure, sensor, drive.laser_power_w, drive.integration_s)
+    electrons = undiminished = collect(exposure, sensor, drive.laser_power_w, drive.integration_s)
+    if power_w is not None:
+        electrons = collect(exposure, sensor, power_w, drive.integration_s)
     raw = acquire(electrons, sensor, shots=shots, noise=noise, offsets=drive.offsets)
     prediction_m = problem.kept.distance_of(frames)
     noise_lsb = sample_noise_lsb(
@@ -100,7 +109,7 @@ def acquire_depth(
         noise_lsb=noise_lsb,
         shift_m=drive.drift_m,
     )
-    scored = scored_pixels(electrons, exposure.distance_m, problem)
+    scored = scored_pixels(undiminished, exposure.distance_m, problem)
     return Acquisition(raw, depth, prediction_m, noise_lsb, exposure.distance_m, scored)
 
 
@@ -113,10 +122,16 @@ def scored_pixels(electrons: Electrons, truth_m: Tensor, problem: Problem) -> Te
 
 
 def measure(
-    problem: Problem, drive: Drive, step: Tensor, shots: Shots, noise: Iterable[Tensor] | None = None
+    problem: Problem,
+    drive: Drive,
+    step: Tensor,
+    shots: Shots,
+    power_w: Tensor | None = None,
+    *,
+    noise: Iterable[Tensor] | None = None,
 ) -> Measured:
-    """Acquire, correct and score the frames at `step` [B] of `drive`."""
-    made = acquire_depth(problem, drive, step, shots, noise)
+    """Acquire, correct and score the frames at `step` [B] of `drive`; see `acquire_depth`."""
+    made = acquire_depth(problem, drive, step, shots, power_w, noise=noise)
     valid = weights_of(made.depth.valid)
     score = score_depth(
         made.depth.distance_m,

@@ -22,14 +22,24 @@ class Recall:
 
     What an acquisition gives depends on the drive, the frame and the shots alone, so an
     environment that plays the same drives again need not acquire again. A drive of 256 frames
-    takes at most 0.4 MB.
+    takes at most 0.4 MB. The power of a derated laser is a new one every time: nothing is kept
+    of it.
     """
 
     def __init__(self) -> None:
         self._rows: dict[tuple[int, int, int], list[float]] = {}
 
-    def __call__(self, problem: Problem, drive: Drive, step: Tensor, shots: Shots) -> Measured:
+    def __call__(
+        self,
+        problem: Problem,
+        drive: Drive,
+        step: Tensor,
+        shots: Shots,
+        power_w: Tensor | None = None,
+    ) -> Measured:
         """As `measure`, for the frames at `step` [B] of `drive`."""
+        if power_w is not None:
+            return measure(problem, drive, step, shots, power_w)
         keys = [
             (seed, frame, int(shots))
             for seed, frame in zip(drive.seed.tolist(), step.tolist(), strict=True)

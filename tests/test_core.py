@@ -147,7 +147,7 @@ def test_the_table_holds_what_each_step_pays(problem):
     for frame, action in enumerate(actions):
         before = state
         state, outcome = step(problem, state, torch.tensor([action]))
-        assert not bool(before.tripped)
+        assert not bool(before.laser.tripped)
         assert outcome.reward.item() == table.reward[frame, action].item()
         assert outcome.cost.heat_j.item() == table.heat_j[frame, action].item()
         assert outcome.score.error.item() == table.terms["error"][frame, action].item()

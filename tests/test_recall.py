@@ -29,9 +29,9 @@ def test_a_remembered_drive_is_the_same_drive(tiny_kwargs):
 def test_nothing_is_measured_twice(tiny_kwargs, monkeypatch):
     measured = []
 
-    def counted(problem, drive, step, shots, real=recall.measure):
+    def counted(problem, drive, step, *chosen, real=recall.measure):
         measured.append(len(step))
-        return real(problem, drive, step, shots)
+        return real(problem, drive, step, *chosen)
 
     monkeypatch.setattr(recall, "measure", counted)
     envs = ShotScheduleVectorEnv(3, autoreset_mode="Disabled", remember=True, **tiny_kwargs)

@@ -9,8 +9,6 @@ from shotenv.laser.energy import efficiency_at, emitted_power_w, shot_cost
 from shotenv.laser.state import LaserState, laser_step, start_laser, too_bright
 from shotenv.laser.thermal import case_step, junction_step, relaxed, trip_step
 
-thermal_step = case_step
-
 __all__ = ["LaserState", "ageing_rate", "case_step", "efficiency_at", "emitted_power_w"]
 __all__ += ["junction_step", "laser_step", "relaxed", "shot_cost"]
-__all__ += ["start_laser", "thermal_step", "too_bright", "trip_step"]
+__all__ += ["start_laser", "too_bright", "trip_step"]

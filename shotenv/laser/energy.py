@@ -45,7 +45,7 @@ def shot_cost(
     laser: LaserConfig,
     *,
     optical_power_w: Tensor,
-    temperature_k: Tensor | float = ROOM_K,
+    temperature_k: Tensor,
     integration_s: Tensor,
     frame_period_s: float,
     network_macs: float,
