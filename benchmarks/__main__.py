@@ -7,7 +7,7 @@ import importlib
 import json
 from pathlib import Path
 
-BENCHMARKS = ("stepping", "rendering")
+BENCHMARKS = ("stepping", "sensing", "rendering")
 
 
 def main() -> None:

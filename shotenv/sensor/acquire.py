@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import reduce
 from itertools import repeat
@@ -17,7 +17,7 @@ from shotenv.sensor.electrons import (
     add_noise,
     clip_to_full_well,
     electrons_per_radiance_second,
-    tap_electrons,
+    tap_packets,
 )
 from shotenv.sensor.offsets import OffsetPattern, ambient_offset_lsb
 from unwrap.acquisition import Shots
@@ -109,13 +109,15 @@ def acquire(
     Sample after sample, so that what one sample needs stays in the processor's cache; `noise`
     gives the normals [B, 2, H, W] of each.
     """
-    mean_e = (electrons.active_e + electrons.ambient_e).mul_(0.5)
+    read_variance_e = sensor.read_noise_e**2
+    mean_e = (electrons.active_e + electrons.ambient_e).mul_(0.5).add_(read_variance_e)
     half_modulation = mean_e.new_tensor([0.5, -0.5]).view(2, 1, 1).mul_(sensor.contrast)
     per_correlation_e = electrons.per_correlation_e.unsqueeze(1) * half_modulation
+    full_e = sensor.full_well_e + read_variance_e
     pattern_lsb = fixed_pattern_lsb(electrons.ambient_e, sensor, offsets)
     batch, _, height, width = electrons.correlation.shape
     dcs_lsb = mean_e.new_empty(batch, int(shots), height, width)
-    fullest_e = []
+    fullest_e = torch.zeros(())
     samples = zip(
         dcs_lsb.unbind(1),
         electrons.correlation.unbind(1),
@@ -123,32 +125,31 @@ def acquire(
         strict=False,
     )
     for sample_lsb, correlation, normals in samples:
-        taps_e = tap_electrons(mean_e, correlation, per_correlation_e)
+        taps_e = tap_packets(mean_e, correlation, per_correlation_e, sensor.read_noise_e)
         if normals is not None:
-            add_noise(taps_e, normals, sensor.read_noise_e)
-        tap_a_e, tap_b_e = clip_to_full_well(taps_e, sensor.full_well_e).unbind(1)
-        read_out(tap_a_e - tap_b_e, pattern_lsb, sensor, out=sample_lsb)
-        fullest_e.append(torch.maximum(tap_a_e, tap_b_e))
-    return RawFrame(dcs_lsb, _saturated(fullest_e, dcs_lsb, sensor))
+            add_noise(taps_e, normals)
+        clip_to_full_well(taps_e, full_e)
+        read_out(taps_e, pattern_lsb, sensor, out=sample_lsb)
+        fullest_e = torch.maximum(taps_e, fullest_e)
+    return RawFrame(dcs_lsb, _saturated(fullest_e, full_e, dcs_lsb, sensor))
 
 
-def read_out(
-    difference_e: Tensor, pattern_lsb: Tensor, sensor: SensorConfig, *, out: Tensor
-) -> None:
-    """Signed words [B, H, W] of a sample, the difference of its taps in electrons.
+def read_out(taps_e: Tensor, pattern_lsb: Tensor, sensor: SensorConfig, *, out: Tensor) -> None:
+    """Signed words [B, H, W] of a sample from its taps [B, 2, H, W], electrons.
 
-    Gain, offset, rounding and the converter's range.
+    The taps' difference, then gain, offset, rounding and the converter's range.
     """
+    difference_e = torch.sub(*taps_e.unbind(1))
     torch.add(pattern_lsb, difference_e, alpha=sensor.gain_lsb_per_e, out=out)
     digitise(out, *signed_limits_lsb(sensor.adc_bits))
 
 
-def _saturated(fullest_e: Sequence[Tensor], dcs_lsb: Tensor, sensor: SensorConfig) -> Tensor:
+def _saturated(fullest_e: Tensor, full_e: float, dcs_lsb: Tensor, sensor: SensorConfig) -> Tensor:
     """Where the fuller tap of some sample was full, or its word is at a limit of the range."""
     low, high = signed_limits_lsb(sensor.adc_bits)
     words = dcs_lsb.unbind(1)
     # In place a comparison stays float32, which is vectorised; a bool result is not.
-    beyond = reduce(torch.maximum, fullest_e).ge_(sensor.full_well_e)
+    beyond = torch.maximum(*fullest_e.unbind(1)).ge_(full_e)
     beyond.add_(reduce(torch.maximum, words).ge_(high))
     return beyond.add_(reduce(torch.minimum, words).le_(low)).bool()
 

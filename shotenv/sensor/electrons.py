@@ -33,13 +33,18 @@ def electrons_per_radiance_second(sensor: SensorConfig) -> float:
     return irradiance * area_m2 * per_photon
 
 
-def tap_electrons(mean_e: Tensor, correlation: Tensor, per_correlation_e: Tensor) -> Tensor:
-    """Mean charge of both taps in one sample, `(S + B) / 2 +- m C_k / 2`.
+def tap_packets(
+    mean_e: Tensor, correlation: Tensor, per_correlation_e: Tensor, read_noise_e: float
+) -> Tensor:
+    """Charge of both taps in one sample plus the variance of reading it, `(S + B +- m C_k) / 2`.
+
+    With the read noise's variance added a packet is its own variance (Poisson's equals the mean),
+    and the difference of two taps is that of their charges.
 
     Parameters
     ----------
     mean_e : [B, H, W]
-        Half of the electrons over both taps, (S + B) / 2.
+        Half of the electrons over both taps and the variance of reading, (S + B) / 2 + sigma_r^2.
     correlation : [B, H, W]
         Correlation of the light with the sample's demodulation, in any unit.
     per_correlation_e : [B, 2, 1, 1]
@@ -48,20 +53,19 @@ def tap_electrons(mean_e: Tensor, correlation: Tensor, per_correlation_e: Tensor
     Returns
     -------
     [B, 2, H, W]
-        Electrons of tap A and tap B, not negative.
+        Packets of tap A and tap B, of charges that are not negative.
     """
-    taps_e = torch.addcmul(mean_e.unsqueeze(1), correlation.unsqueeze(1), per_correlation_e)
-    return taps_e.clamp_(min=0.0)
+    packets_e = torch.addcmul(mean_e.unsqueeze(1), correlation.unsqueeze(1), per_correlation_e)
+    return packets_e.clamp_(min=read_noise_e**2)
 
 
-def add_noise(charge_e: Tensor, normals: Tensor, read_noise_e: float) -> Tensor:
-    """Shot and read noise added in place: one normal per packet, variance `charge + read^2`.
+def add_noise(packets_e: Tensor, normals: Tensor) -> Tensor:
+    """Shot and read noise added in place: one normal per packet, which is its own variance.
 
     The normal distribution stands for Poisson's: one variate per packet keeps the noise stream
     in step whatever the light is.
     """
-    sigma_e = (charge_e + read_noise_e**2).sqrt_()
-    return charge_e.addcmul_(sigma_e, normals)
+    return packets_e.addcmul_(packets_e.sqrt(), normals)
 
 
 def clip_to_full_well(charge_e: Tensor, full_well_e: float) -> Tensor:

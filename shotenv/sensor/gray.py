@@ -37,7 +37,8 @@ def capture_gray(
     rate = electrons_per_radiance_second(sensor)
     charge_e = ambient * (rate * exposure_s)[:, None, None]
     if noise is not None:
-        add_noise(charge_e, noise, sensor.read_noise_e)
+        read_variance_e = sensor.read_noise_e**2
+        add_noise(charge_e.add_(read_variance_e), noise).sub_(read_variance_e)
     charge_e = clip_to_full_well(charge_e, sensor.full_well_e)
     top = full_scale_lsb(sensor.adc_bits)
     return digitise(charge_e * gray_gain_lsb_per_e(sensor), 0, top).to(torch.int32), exposure_s

@@ -1,0 +1,75 @@
+"""One 8-DCS frame of 320 x 240, sensed and decoded, against drawing its normal numbers alone."""
+
+from __future__ import annotations
+
+from itertools import islice
+from time import perf_counter, thread_time
+
+import torch
+
+from benchmarks.turns import alternately
+from shotenv.config import SensorConfig, find_config, read_config
+from shotenv.frames import Exposure
+from shotenv.sensor import acquire, collect, draw_offsets, noise_samples, stream
+from shotenv.sensor.noise import Purpose
+from unwrap.acquisition import SAMPLES_PER_FREQUENCY, Shots, demodulation_phase_rad, frequency_index
+from unwrap.phase import decode, unambiguous_range_m
+
+HEIGHT, WIDTH = 240, 320
+GOAL = 1.5
+REPEATS = 40
+
+
+def run() -> list[dict]:
+    threads = torch.get_num_threads()
+    try:
+        return [measured(count) for count in (1, 2)]
+    finally:
+        torch.set_num_threads(threads)
+
+
+@torch.inference_mode()
+def measured(threads: int) -> dict:
+    torch.set_num_threads(threads)
+    sensor = read_config(SensorConfig, find_config("sensor", "epc660"))
+    light = made_up_light(sensor)
+    electrons = collect(light, sensor, torch.tensor([7.0]), torch.tensor([6.5e-4]))
+    offsets = draw_offsets(sensor, HEIGHT, WIDTH, generator=stream(Purpose.OFFSETS, 0))
+
+    def sense() -> None:
+        noise = noise_samples([0], [0], HEIGHT, WIDTH)
+        raw = acquire(electrons, sensor, shots=Shots.EIGHT, noise=noise, offsets=offsets)
+        for first in (0, SAMPLES_PER_FREQUENCY):
+            decode(raw.dcs_lsb[:, first : first + SAMPLES_PER_FREQUENCY])
+
+    def draw() -> None:
+        for _ in islice(noise_samples([0], [0], HEIGHT, WIDTH), Shots.EIGHT):
+            pass
+
+    # What two threads do together is seen on the wall clock alone.
+    sense_s, draw_s = alternately(
+        sense, draw, REPEATS, thread_time if threads == 1 else perf_counter
+    )
+    return {
+        "name": f"sensor + decode, 8 DCS / normals, {threads} thread{'s' * (threads > 1)}",
+        "ratio": sense_s / draw_s,
+        "goal": GOAL,
+        "holds": sense_s <= GOAL * draw_s,
+        "note": f"{1e3 * sense_s:.2f} ms against {1e3 * draw_s:.2f} ms, {WIDTH} x {HEIGHT}",
+    }
+
+
+def made_up_light(sensor: SensorConfig) -> Exposure:
+    """Random distances and daylight: the time depends on neither."""
+    random = torch.Generator().manual_seed(0)
+    distance_m = 2.0 + 18.0 * torch.rand(1, HEIGHT, WIDTH, generator=random)
+    active, ambient = 0.1 / distance_m**2, torch.rand(1, HEIGHT, WIDTH, generator=random)
+    ranges_m = [unambiguous_range_m(f_hz) for f_hz in (sensor.f1_hz, sensor.f2_hz)]
+    samples = [
+        active
+        * torch.cos(
+            2 * torch.pi * distance_m / ranges_m[frequency_index(k)] - demodulation_phase_rad(k)
+        )
+        for k in range(Shots.EIGHT)
+    ]
+    return Exposure(torch.stack(samples, dim=1), active, ambient, distance_m)
