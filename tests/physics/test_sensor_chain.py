@@ -7,7 +7,7 @@ import math
 import pytest
 import torch
 
-from shotenv.config import merged
+from shotenv.config import SensorConfig, find_config, merged, read_config
 from shotenv.frames import Exposure
 from shotenv.problem import describe
 from shotenv.sensor import (
@@ -21,9 +21,10 @@ from shotenv.sensor import (
     stream,
 )
 from unwrap.acquisition import Shots, demodulation_phase_rad, frequency_index, harmonic_weights
-from unwrap.calibration import WiggleTable
+from unwrap.calibration import WiggleTable, wiggle_of
 from unwrap.correction import Prediction, SensorDescription, correct
-from unwrap.phase import TWO_PI, unambiguous_range_m
+from unwrap.frequencies import candidate_spacing_m, unambiguous_range_m
+from unwrap.phase import TWO_PI
 
 C_M_S = 299_792_458.0
 POWER_W, INTEGRATION_S, AMBIENT_K = 7.0, 6e-4, 306.15
@@ -132,6 +133,22 @@ def test_drift_shifts_every_measurement_alike(sensor, walls, share):
     shift_m = residual_drift_m(drifting, imager_k)
     for error_m in errors_m(drifting, walls, shift_m=shift_m).values():
         assert (error_m - 16 * 12.5e-3 * (1 - share)).abs().max() < 2e-3
+
+
+@pytest.mark.parametrize("name", ["epc660", "mlx75027"])
+def test_shipped_sensors_measure_alike_with_2_4_and_8_shots(name, walls):
+    """What their tables leave of the wiggle, and no wrong wrap, over the whole range."""
+    shipped = read_config(SensorConfig, find_config("sensor", name))
+    fine = merged(shipped, {**FINE, "saturation_range_m": unambiguous_range_m(shipped.f1_hz)})
+    left = 1 - fine.wiggle_calibrated_share
+    weights = harmonic_weights(fine.harmonic_strength, fine.highest_harmonic)
+    wiggle_rad = max(map(abs, wiggle_of(weights).error_rad))
+    for error_m in errors_m(fine, walls).values():
+        # One word of 0.5 moves the weakest phase by less than a milliradian.
+        assert error_m.abs().max() < (left * wiggle_rad + 1e-3) * per_radian_m(fine.f2_hz)
+    assert describe(fine).max_residual_m < 0.5 * candidate_spacing_m(
+        fine.f1_hz, fine.f2_hz, fine.max_range_m
+    )
 
 
 # --- every effect at once, one number at a time
