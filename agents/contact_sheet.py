@@ -45,10 +45,10 @@ def contact_sheet(bank: Bank, *, clips: int = CLIPS_PER_FAMILY) -> Image.Image:
     """
     if bank.config is None:
         raise BankError(f"bank {bank.folder} was imported: nothing tells its frequencies")
-    maps = color_maps(bank.config.sensor)
-    rows = [_row(bank, of, clips, maps) for of in clips_by_family(bank).values()]
-    width = max(row.width for row in rows)
-    return _framed(_column([_title(bank), *rows, _legend(maps, width)], gap=2 * GAP_PX))
+    maps, scale = color_maps(bank.config.sensor), max(1, bank.width // NARROWEST_TILE_PX)
+    rows = [_row(bank, of, clips, maps, scale) for of in clips_by_family(bank).values()]
+    legend = _legend(maps, max(row.width for row in rows), scale)
+    return _framed(_column([_title(bank, scale), *rows, legend], gap=2 * GAP_PX * scale))
 
 
 def color_maps(sensor: SensorConfig) -> dict[str, ColorMap]:
@@ -58,7 +58,7 @@ def color_maps(sensor: SensorConfig) -> dict[str, ColorMap]:
         "gray image": ColorMap(0.0, 1.0, "share of full scale, gamma 0.5", GRAY),
         "distance": ColorMap(0.0, sensor.max_range_m, "m, clipped above", VIRIDIS),
         "wrapped distance": ColorMap(0.0, unambiguous_m, "m, noise-free", CYCLIC),
-        "amplitude": ColorMap(*AMPLITUDE_DECADES, "log10 of W/m2/sr per W of laser", ERROR),
+        "amplitude": ColorMap(*AMPLITUDE_DECADES, "log10, W/m2/sr per W", ERROR),
     }
 
 
@@ -91,23 +91,28 @@ def choose(clips: Sequence[Clip], count: int) -> list[Clip]:
     return sorted(in_turn[:count], key=lambda clip: clip.start)
 
 
-def _title(bank: Bank) -> Image.Image:
+def _title(bank: Bank, scale: int) -> Image.Image:
     name, size = bank.manifest.name, f"{bank.width} x {bank.height}"
     words = f"{name}: {len(bank)} frames of {size} pixels in {len(bank.clips)} clips"
     note = "light gray: sky, or no laser light comes back"
-    return _line([_text(words, LARGE_PX), _text(note, SMALL_PX, FAINT)])
+    return _line([_text(words, scale * LARGE_PX), _text(note, scale * SMALL_PX, FAINT)])
 
 
-def _row(bank: Bank, of: Sequence[Clip], count: int, maps: dict[str, ColorMap]) -> Image.Image:
+def _row(
+    bank: Bank, of: Sequence[Clip], count: int, maps: dict[str, ColorMap], scale: int
+) -> Image.Image:
     """Heading and pictures of one family."""
     shares = Counter(clip.split for clip in of)
     told = ", ".join(f"{number} {split}" for split, number in shares.items())
-    heading = _line([_text(of[0].family, LARGE_PX), _text(f"{told} clips", SMALL_PX, FAINT)])
-    blocks = [_block(bank, clip, maps) for clip in choose(of, count)]
-    return _column([heading, _line(blocks, gap=MARGIN_PX)])
+    heading = [
+        _text(of[0].family, scale * LARGE_PX),
+        _text(f"{told} clips", scale * SMALL_PX, FAINT),
+    ]
+    blocks = [_block(bank, clip, maps, scale) for clip in choose(of, count)]
+    return _column([_line(heading), _line(blocks, gap=MARGIN_PX)])
 
 
-def _block(bank: Bank, clip: Clip, maps: dict[str, ColorMap]) -> Image.Image:
+def _block(bank: Bank, clip: Clip, maps: dict[str, ColorMap], scale: int) -> Image.Image:
     """Caption and pictures of one clip."""
     middle = clip.frames // 2
     index = clip.start + middle
@@ -118,7 +123,7 @@ def _block(bank: Bank, clip: Clip, maps: dict[str, ColorMap]) -> Image.Image:
     )
     found = quantities(bank, index)
     tiles = [_enlarged(paint(found[name], colors)) for name, colors in maps.items()]
-    return _column([_text(caption, SMALL_PX, FAINT), _line(tiles)])
+    return _column([_text(caption, scale * SMALL_PX, FAINT), _line(tiles)])
 
 
 def _enlarged(image: Image.Image) -> Image.Image:
@@ -129,26 +134,27 @@ def _enlarged(image: Image.Image) -> Image.Image:
     )
 
 
-def _legend(maps: dict[str, ColorMap], width: int) -> Image.Image:
+def _legend(maps: dict[str, ColorMap], width: int, scale: int) -> Image.Image:
     """A colour bar for each picture, over the whole width."""
     each = (width - (len(maps) - 1) * 2 * MARGIN_PX) // len(maps)
-    bars = [_bar(name, colors, each) for name, colors in maps.items()]
+    bars = [_bar(name, colors, each, scale) for name, colors in maps.items()]
     return _line(bars, gap=2 * MARGIN_PX)
 
 
-def _bar(name: str, colors: ColorMap, width: int) -> Image.Image:
-    ramp = np.tile(np.linspace(colors.low, colors.high, width), (BAR_HEIGHT_PX, 1))
-    scale = Image.new("RGB", (width, SMALL_PX + 4), PAPER)
-    pen = ImageDraw.Draw(scale)
+def _bar(name: str, colors: ColorMap, width: int, scale: int) -> Image.Image:
+    small = scale * SMALL_PX
+    ramp = np.tile(np.linspace(colors.low, colors.high, width), (scale * BAR_HEIGHT_PX, 1))
+    ticks = Image.new("RGB", (width, small + 4), PAPER)
+    pen = ImageDraw.Draw(ticks)
     for part, anchor, tick in zip((0.0, 0.5, 1.0), ("la", "ma", "ra"), colors.ticks, strict=True):
-        pen.text((part * (width - 1), 0), tick, FAINT, _font(SMALL_PX), anchor)
-    words = _line([_text(name, SMALL_PX), _text(colors.unit, SMALL_PX, FAINT)])
-    return _column([words, paint(ramp, colors).convert("RGB"), scale])
+        pen.text((part * (width - 1), 0), tick, FAINT, _font(small), anchor)
+    words = _line([_text(name, small), _text(colors.unit, small, FAINT)])
+    return _column([words, paint(ramp, colors).convert("RGB"), ticks])
 
 
 def _text(words: str, size: int, color: tuple[int, int, int] = INK) -> Image.Image:
     font = _font(size)
-    image = Image.new("RGB", (int(font.getlength(words)) + 2 * GAP_PX, size + 5), PAPER)
+    image = Image.new("RGB", (int(font.getlength(words)) + size // 2, size + size // 3), PAPER)
     ImageDraw.Draw(image).text((0, size), words, color, font, "ls")
     return image
 
