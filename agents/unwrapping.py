@@ -52,7 +52,7 @@ def _clip_scores(problem: Problem, clip: Clip) -> list[Scores]:
         scores.append(
             evaluate(
                 {shots: acquisition.raw for shots, acquisition in made.items()},
-                problem.kept.of(frames[step]),
+                problem.kept.distance_of(frames[step]),
                 one.truth_m,
                 one.scored > 0,
                 problem.description,

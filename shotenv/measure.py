@@ -20,7 +20,7 @@ from shotenv.sensor import (
     single_sample_snr,
 )
 from unwrap.acquisition import Shots
-from unwrap.correction import Prediction, correct
+from unwrap.correction import correct
 from unwrap.frames import DepthFrame, RawFrame
 from unwrap.merge import weights_of
 from unwrap.phase import unambiguous_range_m
@@ -34,7 +34,7 @@ class Acquisition:
     ----------
     raw, depth : RawFrame, DepthFrame
         Samples and corrected depth.
-    prediction_m, noise_lsb, truth_m : float32 [B, H, W]
+    predicted_m, noise_lsb, truth_m : float32 [B, H, W]
         The network's coarse distance, the sensor's own estimate of a sample's noise, the truth.
     scored : float32 [B, H, W]
         1 where the pixel counts, else 0.
@@ -42,7 +42,7 @@ class Acquisition:
 
     raw: RawFrame
     depth: DepthFrame
-    prediction_m: Tensor
+    predicted_m: Tensor
     noise_lsb: Tensor
     truth_m: Tensor
     scored: Tensor
@@ -95,13 +95,13 @@ def acquire_depth(
     if power_w is not None:
         electrons = collect(exposure, sensor, power_w, drive.integration_s)
     raw = acquire(electrons, sensor, shots=shots, noise=noise, offsets=drive.offsets)
-    prediction_m = problem.kept.distance_of(frames)
+    predicted_m = problem.kept.distance_of(frames)
     noise_lsb = sample_noise_lsb(
         bank.gray(frames), problem.gray_exposure_s.take(frames), drive.integration_s, sensor
     )
     depth = correct(
         raw,
-        Prediction(prediction_m),
+        predicted_m,
         problem.description,
         merge=problem.config.merge,
         # Four samples of a frequency cancel the offset by themselves.
@@ -110,7 +110,7 @@ def acquire_depth(
         shift_m=drive.drift_m,
     )
     scored = scored_pixels(undiminished, exposure.distance_m, problem)
-    return Acquisition(raw, depth, prediction_m, noise_lsb, exposure.distance_m, scored)
+    return Acquisition(raw, depth, predicted_m, noise_lsb, exposure.distance_m, scored)
 
 
 def scored_pixels(electrons: Electrons, truth_m: Tensor, problem: Problem) -> Tensor:
@@ -158,7 +158,7 @@ def seen_by_sensor(made: Acquisition, valid: Tensor, shots: Shots) -> Tensor:
     if residual is not None:
         maps.append(_bounded(residual, four_sigma))
     if shots == Shots.EIGHT:
-        apart_m = (made.depth.distance_m - made.prediction_m).abs_()
+        apart_m = (made.depth.distance_m - made.predicted_m).abs_()
         maps.append((apart_m / (apart_m + 1.0)).mul_(valid))
     sums = frame_sums(*maps)
     seen = torch.zeros(6, sums.shape[1], dtype=sums.dtype)

@@ -2,7 +2,7 @@ import math
 
 import pytest
 import torch
-from test_unwrap_unwrapper import RANGE_M, SENSOR, guess, raw_frame
+from test_unwrap_unwrapper import RANGE_M, SENSOR, raw_frame
 
 from unwrap.acquisition import Shots
 from unwrap.evaluate import evaluate, mean_scores
@@ -15,7 +15,7 @@ def scores():
     predicted = (truth + 2.0).float()
     truth = truth.float()
     everywhere = truth % RANGE_M < SENSOR.saturation_range_m
-    return truth, evaluate(raws, guess(predicted), truth, everywhere, SENSOR)
+    return truth, evaluate(raws, predicted, truth, everywhere, SENSOR)
 
 
 def test_every_method_is_scored(scores):
@@ -44,7 +44,7 @@ def test_nearest_bears_a_prediction_2_m_off_where_floor_does_not(scores):
 def test_nothing_scored_gives_nan():
     truth = torch.ones(1, 4, 4)
     raws = {Shots.FOUR: raw_frame(truth, 4)}
-    values = evaluate(raws, guess(truth), truth, truth < 0, SENSOR)
+    values = evaluate(raws, truth, truth, truth < 0, SENSOR)
     assert math.isnan(values["4 DCS nearest"]["wrap_accuracy"])
 
 

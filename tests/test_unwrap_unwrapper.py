@@ -7,7 +7,7 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
-from unwrap.correction import Prediction, SensorDescription, correct
+from unwrap.correction import SensorDescription, correct
 from unwrap.frames import RawFrame
 from unwrap.nets import TofRegNet, TofSegNet
 from unwrap.phase import unambiguous_range_m
@@ -40,10 +40,6 @@ def raw_frame(distance_m, count, amplitude=200.0):
         phase = 4 * torch.pi * frequency * distance_m / 299_792_458.0
         samples.append(amplitude * torch.cos(phase - (k % 4) * torch.pi / 2))
     return RawFrame(torch.stack(samples, 1).float(), torch.zeros_like(distance_m).bool())
-
-
-def guess(distance_m):
-    return Prediction(distance_m, torch.ones_like(distance_m))
 
 
 @pytest.fixture
@@ -171,7 +167,7 @@ def test_safetensors_of_something_else_is_refused(tmp_path):
 @pytest.mark.parametrize("merge", ["nearest", "floor"])
 @pytest.mark.parametrize("count", [2, 4])
 def test_few_samples_and_a_perfect_prediction_give_the_truth(truth, count, merge):
-    frame = correct(raw_frame(truth, count), guess(truth.float()), SENSOR, merge=merge)
+    frame = correct(raw_frame(truth, count), truth.float(), SENSOR, merge=merge)
     away = (truth % RANGE_M - RANGE_M / 2).abs() < RANGE_M / 2 - 0.06
     torch.testing.assert_close(frame.distance_m[away], truth[away].float(), rtol=0, atol=1e-3)
     assert torch.equal(frame.wraps[away], (truth[away] / RANGE_M).long())
@@ -188,7 +184,7 @@ def test_invalid_pixels_hold_the_prediction_or_nan(truth):
     raw = raw_frame(truth, 8)
     raw.saturated[0, 0, 0] = True
     raw.dcs_lsb[0, :, 0, 1] *= 0.001
-    guessed = correct(raw, guess(torch.full(truth.shape, 9.0)), SENSOR)
+    guessed = correct(raw, torch.full(truth.shape, 9.0), SENSOR)
     assert guessed.valid.sum() == truth.numel() - 2
     assert guessed.distance_m[0, 0, :2].tolist() == [9.0] * 2
     assert guessed.wraps[0, 0, :2].tolist() == [1] * 2
@@ -201,7 +197,7 @@ def test_where_the_frequencies_disagree_the_prediction_decides(truth):
     raw = raw_frame(truth, 8)
     raw.dcs_lsb[0, 4:, 0, 2] = raw_frame(truth + 1.2, 8).dcs_lsb[0, 4:, 0, 2]
     unambiguous = unambiguous_range_m(SENSOR.f1_hz)
-    second_wrap = guess(truth.float() + unambiguous)
+    second_wrap = truth.float() + unambiguous
     frame = correct(raw, second_wrap, SENSOR)
     expected = truth[0, 0, 2].item() + unambiguous
     assert frame.distance_m[0, 0, 2].item() == pytest.approx(expected, abs=1e-3)
@@ -215,7 +211,7 @@ def test_where_the_frequencies_disagree_the_prediction_decides(truth):
 
 def test_noise_map_decides_what_is_valid(truth):
     noise = torch.where(truth < 10, 100.0, 300.0)
-    frame = correct(raw_frame(truth, 4), guess(truth.float()), SENSOR, noise_lsb=noise)
+    frame = correct(raw_frame(truth, 4), truth.float(), SENSOR, noise_lsb=noise)
     assert torch.equal(frame.valid, truth < 10)
 
 
@@ -223,8 +219,8 @@ def test_offset_map_is_subtracted(truth):
     offset = torch.linspace(-50, 50, 20 * 30).reshape(20, 30)
     raw = raw_frame(truth, 2)
     shifted = RawFrame(raw.dcs_lsb + offset, raw.saturated)
-    frame = correct(shifted, guess(truth.float()), SENSOR, offset_lsb=offset)
-    expected = correct(raw, guess(truth.float()), SENSOR)
+    frame = correct(shifted, truth.float(), SENSOR, offset_lsb=offset)
+    expected = correct(raw, truth.float(), SENSOR)
     torch.testing.assert_close(frame.distance_m, expected.distance_m, rtol=0, atol=1e-3)
 
 
@@ -232,7 +228,7 @@ def test_correct_refuses_what_it_cannot_do(truth):
     with pytest.raises(ValueError, match="prediction is None"):
         correct(raw_frame(truth, 4), None, SENSOR)
     with pytest.raises(ValueError, match="merge is 'ceil'"):
-        correct(raw_frame(truth, 4), guess(truth), SENSOR, merge="ceil")
+        correct(raw_frame(truth, 4), truth, SENSOR, merge="ceil")
 
 
 def test_import_is_light():

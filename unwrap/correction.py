@@ -61,26 +61,9 @@ class SensorDescription:
     wiggle: tuple[WiggleTable, WiggleTable] | None = None
 
 
-@dataclass(frozen=True)
-class Prediction:
-    """What a network makes of a gray image.
-
-    Attributes
-    ----------
-    distance_m : float32 [B, H, W]
-        Coarse distance, metres.
-    confidence : float32 [B, H, W] or None
-        0..1, see `unwrap.unwrapper.Unwrapper.predict`; None where it is not known. Correction
-        does not need it.
-    """
-
-    distance_m: Tensor
-    confidence: Tensor | None = None
-
-
 def correct(
     raw: RawFrame,
-    prediction: Prediction | None,
+    predicted_m: Tensor | None,
     sensor: SensorDescription,
     *,
     merge: Merge = "nearest",
@@ -96,8 +79,8 @@ def correct(
     ----------
     raw : RawFrame
         Two, four or eight samples.
-    prediction : Prediction or None
-        Coarse distance of the same frames. None is allowed with eight samples.
+    predicted_m : float32 [B, H, W] or None
+        A network's coarse distance. None is allowed with eight samples.
     merge : "nearest" or "floor"
         The nearest wrap candidate, ours, or eq. 6. For TofSegNet, whose prediction lies within
         its likeliest class, "floor" is eq. 8, with the prediction where the sensor saturates.
@@ -131,16 +114,16 @@ def correct(
             max_range_m=sensor.max_range_m,
         )
         agree = residual_m.le_(sensor.max_residual_m)
-        if prediction is not None:
-            guess_m = _merged(first, prediction, sensor, merge)
+        if predicted_m is not None:
+            guess_m = _merged(first, predicted_m, sensor, merge)
             merged_m = guess_m.lerp_(merged_m, agree)
         else:
             valid.mul_(agree)
-    elif prediction is None:
-        raise ValueError(f"prediction is None; {int(raw.shots)} samples cannot be unwrapped alone")
+    elif predicted_m is None:
+        raise ValueError(f"predicted_m is None; {int(raw.shots)} samples cannot be unwrapped alone")
     else:
-        merged_m = _merged(first, prediction, sensor, merge)
-    return _frame(merged_m, valid, first, prediction, sensor)
+        merged_m = _merged(first, predicted_m, sensor, merge)
+    return _frame(merged_m, valid, first, predicted_m, sensor)
 
 
 def decode_at(
@@ -167,11 +150,11 @@ def decode_at(
 
 
 def _merged(
-    first: PhaseFrame, prediction: Prediction, sensor: SensorDescription, merge: Merge
+    first: PhaseFrame, predicted_m: Tensor, sensor: SensorDescription, merge: Merge
 ) -> Tensor:
     """The first frequency's wrapped map, unwrapped by the prediction."""
     return MERGES[merge](
-        prediction.distance_m,
+        predicted_m,
         distance_m(first.phase_rad, sensor.f1_hz),
         unambiguous_range_m(sensor.f1_hz),
         sensor.saturation_range_m,
@@ -182,13 +165,13 @@ def _frame(
     merged_m: Tensor,
     valid: Tensor,
     first: PhaseFrame,
-    prediction: Prediction | None,
+    predicted_m: Tensor | None,
     sensor: SensorDescription,
 ) -> DepthFrame:
     """Depth with the guess, or NaN without one, where the weight `valid` is 0."""
-    if prediction is None:
+    if predicted_m is None:
         depth_m = merged_m.masked_fill_(valid == 0, torch.nan)
     else:
-        depth_m = prediction.distance_m.lerp(merged_m, valid)
+        depth_m = predicted_m.lerp(merged_m, valid)
     unambiguous_m = unambiguous_range_m(sensor.f1_hz)
     return DepthFrame(depth_m, valid.bool(), first.amplitude, first.residual, unambiguous_m)

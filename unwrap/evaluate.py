@@ -14,7 +14,6 @@ from unwrap.acquisition import Shots
 from unwrap.correction import (
     MERGES,
     Merge,
-    Prediction,
     SensorDescription,
     correct,
     decode_at,
@@ -28,7 +27,7 @@ Scores = dict[str, dict[str, float]]
 
 def evaluate(
     raws: Mapping[Shots, RawFrame],
-    prediction: Prediction,
+    predicted_m: Tensor,
     truth_m: Tensor,
     scored: Tensor,
     sensor: SensorDescription,
@@ -43,8 +42,8 @@ def evaluate(
     ----------
     raws : mapping of Shots to RawFrame
         Acquisitions of the same B frames with 2, 4 or 8 samples; any of them may be missing.
-    prediction : Prediction
-        Of the same frames, [B, H, W].
+    predicted_m : float [B, H, W]
+        A network's coarse distance of the same frames.
     truth_m : float [B, H, W]
         True distance, metres.
     scored : bool [B, H, W]
@@ -60,7 +59,7 @@ def evaluate(
         unambiguous range off; for acquisitions also `valid_share` of the scored pixels.
     """
     half_m = unambiguous_range_m(sensor.f1_hz) / 2
-    scores = {"prediction": score(prediction.distance_m, truth_m, scored, half_m)}
+    scores = {"prediction": score(predicted_m, truth_m, scored, half_m)}
     for shots, raw in raws.items():
         for name, merge in _methods(shots).items():
             if merge is None:
@@ -69,7 +68,7 @@ def evaluate(
             else:
                 frame = correct(
                     raw,
-                    prediction,
+                    predicted_m,
                     sensor,
                     merge=merge,
                     offset_lsb=offset_lsb,

@@ -8,7 +8,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from unwrap.correction import Merge, Prediction, SensorDescription, correct
+from unwrap.correction import Merge, SensorDescription, correct
 from unwrap.data import GRAY_FULL_SCALE
 from unwrap.nets import (
     NETWORKS,
@@ -24,6 +24,22 @@ from unwrap.weights import load_weights
 __all__ = ["Merge", "Prediction", "SensorDescription", "Unwrapper", "correct", "load_unwrapper"]
 
 SHIPPED = Path(__file__).parent / "weights"
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a network makes of a gray image.
+
+    Attributes
+    ----------
+    distance_m : float32 [B, H, W]
+        Coarse distance, metres.
+    confidence : float32 [B, H, W]
+        0..1, see `Unwrapper.predict`.
+    """
+
+    distance_m: Tensor
+    confidence: Tensor
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from shotenv.sensor import (
 )
 from unwrap.acquisition import Shots, demodulation_phase_rad, frequency_index, harmonic_weights
 from unwrap.calibration import WiggleTable, wiggle_of
-from unwrap.correction import Prediction, SensorDescription, correct
+from unwrap.correction import SensorDescription, correct
 from unwrap.frequencies import candidate_spacing_m, unambiguous_range_m
 from unwrap.phase import TWO_PI
 
@@ -67,17 +67,13 @@ def acquired(exposure, sensor, shots, *, noise=None, offsets=None):
     )
 
 
-def truth_as_prediction(distance):
-    return Prediction(distance[None], torch.ones_like(distance)[None])
-
-
 def errors_m(sensor, distance, *, shift_m=None) -> dict[Shots, torch.Tensor]:
     """Measured minus true distance of a static, noise-free scene with a perfect prediction."""
     exposure = scene(sensor, distance, torch.full_like(distance, 0.01), torch.zeros_like(distance))
     found = {}
     for shots in Shots:
         raw = acquired(exposure, sensor, shots)
-        frame = correct(raw, truth_as_prediction(distance), describe(sensor), shift_m=shift_m)
+        frame = correct(raw, distance[None], describe(sensor), shift_m=shift_m)
         assert frame.valid.all()
         found[shots] = (frame.distance_m - distance)[0]
     return found
@@ -255,7 +251,7 @@ def test_a_slow_loop_over_pixels_gives_the_same_depth(sensor, shots):
     raw = acquired(exposure, everything, shots, noise=noise, offsets=offsets)
     frame = correct(
         raw,
-        Prediction(predicted[None], torch.ones(1, 16, 16)),
+        predicted[None],
         known,
         offset_lsb=offsets.calibrated_lsb,
         noise_lsb=2.0,
