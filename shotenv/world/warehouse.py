@@ -47,7 +47,7 @@ def shell(site: Site, rng: np.random.Generator, end: float, half: float, height:
     cladding, roof, steel = m.METAL.draw(rng), m.WHITE_PAINT.draw(rng), m.METAL.draw(rng)
     x = (-12.0, end)
     middle, length = sum(x) / 2, end - x[0]
-    site.build(meshes.patch(x, (-half, half), 0.0, m.COATED_FLOOR.draw(rng)))
+    site.build(meshes.patch((x[0], end + 0.3), (-half, half), 0.0, m.COATED_FLOOR.draw(rng)))
     site.build(meshes.box((length, 2 * half + 1.0, 0.3), roof, (middle, 0.0, height)))
     for along in np.arange(x[0] + 3.0, end, 6.0):
         site.build(meshes.box((0.2, 2 * half, 0.45), steel, (along, 0.0, height - 0.45)))
