@@ -29,6 +29,8 @@ class Geometry:
         Corners of what stands still, world coordinates, metres.
     moving : float32 [T * M, 3, 3]
         Corners of what moves at each instant, world coordinates plus `tile_m` of the instant.
+    panes : float32 [P, 3, 3]
+        Corners of all faces that light passes, still or moving, at each instant, like `moving`.
     tile_m : float32 [T, 3]
         Where on the grid the copy of each instant stands.
     normals : float32 [S + T * M, 4]
@@ -42,6 +44,7 @@ class Geometry:
 
     static: np.ndarray
     moving: np.ndarray
+    panes: np.ndarray
     tile_m: np.ndarray
     normals: np.ndarray
     surface: np.ndarray
@@ -64,10 +67,14 @@ def geometry_at(world: World, times_s: Sequence[float], bounces: int) -> Geometr
     radius = np.abs(moving[..., :2] - np.asarray(world.ego.at(times_s[0]).position_m[:2])).max()
     tile = tile_grid(len(times_s), spacing_m=radius + (bounces + 1) * REACH_M)
     meshes = [world.static, *(thing.mesh for thing in world.moving), *_padding(world)]
-    tiled = (moving + tile[:, None, None, :]).reshape(-1, 3, 3)
+    clear = np.concatenate([mesh.clear for mesh in meshes]) > 0
+    still, moves = np.split(clear, [len(world.static.corners)])
+    at_tile = tile[:, None, None, :]
+    panes = (world.static.corners[still] + at_tile, moving[:, moves] + at_tile)
     return Geometry(
         static=world.static.corners.astype(np.float32),
-        moving=tiled.astype(np.float32),
+        moving=(moving + at_tile).reshape(-1, 3, 3).astype(np.float32),
+        panes=np.concatenate(panes, axis=1).reshape(-1, 3, 3).astype(np.float32),
         tile_m=tile.astype(np.float32),
         normals=_normals(np.concatenate([world.static.corners, moving.reshape(-1, 3, 3)])),
         surface=np.concatenate([_surface(mesh) for mesh in meshes]),

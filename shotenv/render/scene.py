@@ -66,7 +66,9 @@ class Scene:
         self._noise = mi.Texture2f(
             mi.TensorXf(noise_texture()[..., None]), wrap_mode=dr.WrapMode.Repeat
         )
-        self._has_panes = dr.opaque(mi.Bool, bool(geometry.uv[:, 7].any()))
+        self._has_panes = dr.opaque(mi.Bool, len(geometry.panes) > 0)
+        # A mesh cannot be empty.
+        self._panes = _mitsuba_scene(geometry.panes if len(geometry.panes) else geometry.moving[:1])
         self._static_faces = dr.opaque(mi.UInt32, len(geometry.static))
         self._moving_faces = dr.opaque(mi.UInt32, len(geometry.moving) // len(geometry.tile_m))
 
@@ -110,6 +112,7 @@ class Scene:
         free = active & ~blocked
         free &= ~self._moving.ray_test(_ray(origin + tile, direction, length), False, free)
         behind = active & ~free & self._has_panes
+        behind = self._panes.ray_test(_ray(origin + tile, direction, length), False, behind)
         through = self._through_panes(origin, direction, length, instant, behind)
         return dr.select(free, 1, dr.select(behind, through, 0))
 
