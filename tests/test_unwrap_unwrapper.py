@@ -225,7 +225,7 @@ def test_offset_map_is_subtracted(truth):
 
 
 def test_correct_refuses_what_it_cannot_do(truth):
-    with pytest.raises(ValueError, match="prediction is None"):
+    with pytest.raises(ValueError, match="predicted_m is None"):
         correct(raw_frame(truth, 4), None, SENSOR)
     with pytest.raises(ValueError, match="merge is 'ceil'"):
         correct(raw_frame(truth, 4), truth, SENSOR, merge="ceil")
