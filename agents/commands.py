@@ -68,11 +68,11 @@ def report(arguments: Namespace) -> int:
 
 def _report(arguments: Namespace, results: dict[str, Any]) -> int:
     from agents.report import write_report
-    from agents.results import verdict
+    from agents.results import rival_note, verdict
 
     page = write_report(arguments.out)
     _write_json(arguments, results)
-    print(f"\n{verdict(results)}\n\nReport: {page.resolve()}")
+    print(f"\n{verdict(results)} {rival_note(results)}\n\nReport: {page.resolve()}")
     return DONE
 
 

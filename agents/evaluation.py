@@ -142,6 +142,12 @@ def best_fixed(played: Mapping[str, Played]) -> str:
     return max(FIXED, key=lambda name: played[name].reward.sum())
 
 
+def best_rival(played: Mapping[str, Played], scheduler: str) -> str:
+    """Name of the policy with the highest mean return on these drives, but for the scheduler."""
+    others = [name for name in played if name != scheduler]
+    return max(others, key=lambda name: played[name].reward.sum())
+
+
 def summary(
     played: Mapping[str, Played], study: StudyConfig, *, scheduler: str, **extra: Any
 ) -> dict[str, Any]:
@@ -158,7 +164,7 @@ def summary(
     extra
         Further keys.
     """
-    fixed = best_fixed(played)
+    fixed, rival = best_fixed(played), best_rival(played, scheduler)
     families = sorted(set(played[fixed].family.ravel().tolist()))
     return {
         "policies": {name: _measured(one, study) for name, one in played.items()},
@@ -166,11 +172,15 @@ def summary(
             name: difference(one, played[fixed], study).named("difference")
             for name, one in played.items()
         },
+        "paired_to_best_rival": difference(played[scheduler], played[rival], study).named(
+            "difference"
+        ),
         "drives": len(played[fixed].seeds),
         "seeds": played[fixed].seeds.tolist(),
         "versions": versions(),
         "scheduler": scheduler,
         "best_fixed": fixed,
+        "best_rival": rival,
         "confidence": study.confidence,
         "families": {
             name: {family: one.shots_share(family) for family in families}

@@ -20,6 +20,7 @@ from agents.results import (
     label,
     read_json,
     read_strip,
+    rival_note,
     verdict,
 )
 from unwrap.files import write_text
@@ -62,6 +63,7 @@ def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip) -
     return environment.get_template("report.html.jinja").render(
         results=results,
         verdict=verdict(results),
+        rival_note=rival_note(results),
         label=label,
         rows=_rows(results),
         cards=_cards(results),

@@ -80,7 +80,7 @@ def verdict(results: dict[str, Any]) -> str:
     scheduler, fixed = results["scheduler"], results["best_fixed"]
     pair = results["paired_to_best_fixed"][scheduler]
     interval = f"{results['confidence']:.0%} interval {pair['low']:+.1f} to {pair['high']:+.1f}"
-    against = f"the best fixed choice, {label(fixed).lower().replace('dcs', 'DCS')}"
+    against = f"the best fixed choice, {_in_a_sentence(fixed)}"
     drives = f"over {results['drives']} test drives"
     if pair["low"] <= 0.0 <= pair["high"]:
         return (
@@ -93,6 +93,21 @@ def verdict(results: dict[str, Any]) -> str:
         f"The trained scheduler {beats} {against}, by {abs(pair['difference']):.1f} in return "
         f"({interval}) {drives}, with {_energy_change(results, scheduler, fixed)}."
     )
+
+
+def rival_note(results: dict[str, Any]) -> str:
+    """How the scheduler does against the strongest other policy, in one sentence."""
+    pair, rival = results["paired_to_best_rival"], _in_a_sentence(results["best_rival"])
+    interval = f"{results['confidence']:.0%} interval {pair['low']:+.1f} to {pair['high']:+.1f}"
+    known = "" if pair["low"] * pair["high"] > 0.0 else ", which includes zero"
+    return (
+        f"Against the strongest of the other policies, {rival}, its return is "
+        f"{pair['difference']:+.1f} ({interval}{known})."
+    )
+
+
+def _in_a_sentence(name: str) -> str:
+    return label(name).lower().replace("dcs", "DCS").replace("snr", "SNR")
 
 
 def _energy_change(results: dict[str, Any], scheduler: str, fixed: str) -> str:

@@ -6,6 +6,7 @@ from agents.results import Strip
 from shotenv.config import FAMILIES
 
 NAMES = ("ppo", "snr_threshold", "cycle", "random", "always_2", "always_4", "always_8")
+NAMES += ("always_8_guarded",)
 
 
 def made_up_interval(mean, width):
@@ -35,6 +36,8 @@ def made_up_results(difference=(6.0, 2.0, 9.0)):
     return {
         "policies": policies,
         "paired_to_best_fixed": dict.fromkeys(NAMES, zero) | {"ppo": pair},
+        "paired_to_best_rival": {"difference": 0.4, "low": -0.2, "high": 1.1},
+        "best_rival": "always_8_guarded",
         "drives": 24,
         "seeds": list(range(1000, 1024)),
         "versions": {"shotenv": "0.1.0", "torch": "2.13.0"},

@@ -3,7 +3,15 @@ import dataclasses
 import numpy as np
 import pytest
 
-from agents.evaluation import FIXED, Played, best_fixed, difference, play_drives, summary
+from agents.evaluation import (
+    FIXED,
+    Played,
+    best_fixed,
+    best_rival,
+    difference,
+    play_drives,
+    summary,
+)
 from agents.guard import ThermalGuard
 from agents.optimum import clairvoyant, play, threshold
 from agents.policies import FixedPolicy, PpoPolicy, RandomPolicy, SnrThresholdPolicy
@@ -110,6 +118,8 @@ def test_summary_pairs_every_policy_with_the_best_fixed_choice():
     assert results["paired_to_best_fixed"]["ppo"] == pytest.approx(
         {"difference": 2.0, "low": 2.0, "high": 2.0}
     )
+    assert results["best_rival"] == best_rival(played, "ppo") == "always_2"
+    assert results["paired_to_best_rival"]["difference"] == pytest.approx(2.0)
     assert results["paired_to_best_fixed"]["always_4"]["difference"] == pytest.approx(-4.0)
     assert results["policies"]["ppo"]["energy_j"] == {"mean": 8.0, "low": 8.0, "high": 8.0}
     assert results["families"]["ppo"] == {"garage": [0.0, 1.0, 0.0]}

@@ -7,7 +7,7 @@ from report_sample import made_up_results, made_up_strip, made_up_timeline
 
 from agents.pictures import VIRIDIS, ColorMap, picture
 from agents.report import REPORT, render_page, write_report
-from agents.results import FRAMES, RESULTS, TIMELINE, read_strip, verdict, write_strip
+from agents.results import FRAMES, RESULTS, TIMELINE, read_strip, rival_note, verdict, write_strip
 from shotenv.config import FAMILIES
 from unwrap.files import write_bytes, write_json
 
@@ -48,6 +48,14 @@ def test_verdict_says_what_the_interval_says(difference, says):
     assert says in sentence and sentence.count(". ") == 0 and sentence.endswith(".")
 
 
+def test_strongest_rival_is_named_with_its_interval():
+    results = made_up_results()
+    assert "always 8 DCS, guarded, its return is +0.4" in rival_note(results)
+    assert "-0.2 to +1.1, which includes zero" in rival_note(results)
+    results["paired_to_best_rival"] = {"difference": 0.4, "low": 0.1, "high": 1.1}
+    assert "zero" not in rival_note(results)
+
+
 def test_page_is_self_contained(page):
     without_plotly = re.sub(r"<script>.*?</script>", "", page, count=1, flags=re.DOTALL)
     assert not re.search(r"(src|href)\s*=\s*[\"'](https?:)?//", without_plotly)
@@ -59,7 +67,7 @@ def test_page_shows_every_policy_and_family(page):
         assert name in page
     for family in FAMILIES:
         assert f'data-family="{family}"' in page
-    assert verdict(made_up_results()) in page
+    assert verdict(made_up_results()) in page and rival_note(made_up_results()) in page
 
 
 def test_page_holds_five_pictures_of_each_frame(page):
