@@ -87,7 +87,7 @@ def problem(arguments: Namespace) -> int:
     config = _experiment(arguments)
     check_solvable(config.env.laser)  # before minutes are spent
     make_ready(config.env)
-    counts = {"validation": config.study.tuning_drives, "test": config.study.drives}
+    counts = {"validation": config.study.tuning_drives, config.study.split: config.study.drives}
     frames = sum(counts.values()) * config.env.frames_per_drive
     problems = {
         split: open_problem(config.env.model_copy(update={"split": split})) for split in counts

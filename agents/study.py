@@ -130,7 +130,7 @@ def baselines(config: DemoConfig) -> dict[str, Policy]:
 def play_all(config: DemoConfig, policies: Mapping[str, Policy]) -> dict[str, Played]:
     """Every policy on the same test drives."""
     seeds = drive_seeds(config.study, config.study.drives)
-    envs = make_envs(config.env, "test", len(seeds), "Disabled")
+    envs = make_envs(config.env, config.study.split, len(seeds), "Disabled")
     frames = len(policies) * len(seeds) * config.env.frames_per_drive
     with progress(frames, "evaluating on test drives", "frame") as bar:
         return {
@@ -179,7 +179,7 @@ def _write(
         timeline(compared, shown, config.env.frame_rate_hz, laser.trip_k, laser.release_k),
     )
     write_drives(out / DRIVES, drive_rows(played))
-    problem = open_problem(config.env.model_copy(update={"split": "test"}))
+    problem = open_problem(config.env.model_copy(update={"split": config.study.split}))
     write_strip(out / FRAMES, take_strip(problem, played[SCHEDULER]))
     write_results(out / RESULTS, results)
 

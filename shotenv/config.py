@@ -261,6 +261,9 @@ class AgentConfig(Section):
 class StudyConfig(Section):
     """Evaluation: which drives and how many bootstrap draws."""
 
+    split: Literal["test", "shift"] = Field(
+        "test", description="clips that the drives are made of; shift: families never trained on"
+    )
     drives: int = Field(24, ge=2, description="test drives, the same for every policy")
     tuning_drives: int = Field(12, ge=2, description="validation drives that tune the rule")
     seed: int = Field(1000, ge=0, description="seed of the first drive")
