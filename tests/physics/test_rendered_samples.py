@@ -34,6 +34,12 @@ SPEED_OF_LIGHT_M_S = 299_792_458.0
 BURIED = mesh(square((0, 0, -50.0), (1, 0, 0), (0, 1, 0)))
 
 
+@pytest.fixture
+def sensor(sensor):
+    """The sensor with sinusoidal light, unless a test says otherwise."""
+    return sensor.model_copy(update={"harmonic_strength": 0.0})
+
+
 def coming(distance_m: float, speed_m_s: float):
     """A wall that comes towards the camera."""
     motion = Motion(Pose((distance_m, 0.0, 0.0), math.pi), speed_m_s)
