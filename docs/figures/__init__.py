@@ -1,0 +1,1 @@
+"""Figures of the physics page, by stage: light, sensor, decoding, laser."""
