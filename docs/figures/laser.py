@@ -133,7 +133,7 @@ def _trips(panel) -> None:
             state = laser_step(state, cost, ambient_k, laser, PERIOD_S)
         panel.plot(times, found, color=colour, label=name)
     for kelvin, name in ((LASER.trip_k, "trip"), (LASER.release_k, "release")):
-        panel.axhline(kelvin - 273.15, color=GRAY, ls="--", lw=0.8)
+        panel.hlines(kelvin - 273.15, 0, 20, color=GRAY, ls="--", lw=0.8)
         panel.text(20.2, kelvin - 273.15, name, va="center", color=GRAY)
     panel.set_xlim(0, 23)
     label(panel, "time, s", "junction, °C", loc="lower right")

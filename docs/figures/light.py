@@ -112,7 +112,7 @@ def multipath() -> Made:
         )
     show(figure, panels[0], error_mm, "measured minus true, mm", vmin=0)
     panels[1].set_ylim(0, 260)
-    label(panels[1], "column", "measured minus true, mm", ncols=3, loc="upper center")
+    label(panels[1], "column", "measured minus true, mm", loc="upper right")
     return figure, []
 
 

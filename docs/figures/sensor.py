@@ -128,8 +128,8 @@ def _depth_std_m(shots: Shots, signal_e: float, ambient_e: float, shape) -> floa
 
 def full_well() -> Made:
     """A sample over the light, until its taps are full."""
-    figure, (panel,) = axes("D0 at distance 0: a full tap, then both")
-    signals = np.linspace(0, 1.6e6, 400)
+    figure, (panel,) = axes("D0 at distance 0: first one tap is full, then both")
+    signals = np.linspace(0, 1.6e6, 1601)
     rows = []
     for ambient_e, colour in ((0.0, BLUE), (1e5, RED)):
         maps = torch.zeros(1, len(signals)), torch.tensor([[active_of(s) for s in signals]])
@@ -153,13 +153,15 @@ def full_well() -> Made:
 def offsets() -> Made:
     """The offset pattern, what its map leaves, and what both cost in distance."""
     figure, panels = axes(
-        "Offset pattern", "Left by the map", "Error without noise", widths=(0.85, 1.05, 1.3)
+        "Offset pattern", "Left by the map", "Error without noise", widths=(1, 1, 1.4)
     )
     pattern = draw_offsets(SENSOR, 120, 160, generator=stream(Purpose.OFFSETS, 3))
     left = pattern.pattern_lsb - pattern.calibrated_lsb
     for panel, values in zip(panels, (pattern.pattern_lsb, left), strict=False):
-        unit = "LSB" if panel is panels[1] else ""
-        show(figure, panel, values[0, 30:70, 30:70], unit, cmap="RdBu_r", vmin=-50, vmax=50)
+        corner = values[0, 30:70, 30:70]
+        image = show(figure, panel, corner, cmap="RdBu_r", vmin=-50, vmax=50)
+    panels[1].set(ylabel="", yticklabels=[])
+    figure.colorbar(image, ax=panels[:2], label="LSB", shrink=0.6)
     amplitudes = np.geomspace(60, 1200, 8)
     for name, shots, known, colour in (
         ("2 DCS", Shots.TWO, None, RED),

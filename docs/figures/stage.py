@@ -64,12 +64,13 @@ def label(panel, x: str, y: str, **legend) -> None:
 
 
 def show(figure: Figure, panel, values, unit: str = "", **options):
-    """A map [H, W] with its scale, if it has a unit of its own."""
+    """Draw a map [H, W], beside its scale if it has a unit of its own; returns the image."""
     image = panel.imshow(values, **options)
     panel.grid(False)
     if unit:
         figure.colorbar(image, ax=panel, label=unit, shrink=0.8)
     panel.set(xlabel="column", ylabel="row")
+    return image
 
 
 def light_of(
