@@ -65,7 +65,8 @@ def laser_energy() -> Made:
     panel.set_ylim(0, 105)
     label(panel, "samples of the frame", "energy, mJ", loc="upper left")
     on_s = 8 * INTEGRATION_S
-    by_hand = on_s * (POWER_W / 0.42 + 2.1) + 9 * 0.26e-3 + 62e-3 * PERIOD_S
+    by_hand = on_s * (POWER_W / LASER.efficiency + LASER.driver_power_w)
+    by_hand += 9 * LASER.readout_energy_j + LASER.static_power_w * PERIOD_S
     return figure, [
         Row("energy of a frame of 8 DCS", f"{1e3 * by_hand:.2f} mJ", f"{bottom[3]:.2f} mJ")
     ]
@@ -79,8 +80,10 @@ def laser_heat() -> Made:
     times, junction_k, case_k = _step_response(step)
     by_hand_k = (
         300
-        - 25 * 0.4 * np.expm1(-times / LASER.junction_time_constant_s)
-        - 75 * 0.4 * np.expm1(-times / LASER.thermal_time_constant_s)
+        - LASER.junction_resistance_k_per_w
+        * 0.4
+        * np.expm1(-times / LASER.junction_time_constant_s)
+        - LASER.thermal_resistance_k_per_w * 0.4 * np.expm1(-times / LASER.thermal_time_constant_s)
     )
     panels[0].plot(times, by_hand_k - 300, color=GRAY, lw=3, alpha=0.5, label="two exponentials")
     panels[0].plot(times, junction_k - 300, "--", color=RED, label="junction")
@@ -159,7 +162,7 @@ def laser_curves() -> Made:
     label(panels[1], "junction, °C", "rated hours per hour of light")
     kelvin_10 = np.array([333.15, 343.15])
     rate = ageing_rate(rated_w, kelvin_10, LASER)
-    by_hand = math.exp(0.55 / 8.617333262e-5 * (1 / 333.15 - 1 / 343.15))
+    by_hand = math.exp(LASER.activation_energy_ev / 8.617333262e-5 * (1 / 333.15 - 1 / 343.15))
     return figure, [
         Row("ageing at 70 °C over that at 60 °C", f"{by_hand:.3f}", f"{rate[1] / rate[0]:.3f}")
     ]

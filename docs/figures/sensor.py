@@ -225,11 +225,13 @@ def temperature() -> Made:
     panels[1].plot(celsius, expected, color=GRAY, lw=1, label="formula")
     panels[1].plot(celsius, stds, "o", color=BLUE, label="drawn")
     label(panels[1], "imager, °C", "standard deviation, LSB")
+    warmer_k = float(imager_k[-1]) - SENSOR.calibration_temperature_k
+    expected_m = SENSOR.distance_drift_m_per_k * warmer_k * (1 - SENSOR.drift_compensated_share)
     warm_m = residual_drift_m(SENSOR, imager_k[-1:])
     return figure, [
         Row(
             "drift left at 70 °C by the compensation",
-            f"{1e3 * 0.0125 * 45 * 0.05:.1f} mm",
+            f"{1e3 * expected_m:.1f} mm",
             f"{1e3 * float(_measured_shift_m(warm_m)[0]):.1f} mm",
         ),
         Row(
