@@ -2,7 +2,7 @@
 
 Both render the same world at the same resolution and number of surface hits. The frame includes
 posing what moves, building its acceleration structures and copying the results to NumPy;
-Mitsuba's scene is built beforehand and stands still.
+what stands still in the world, and all of Mitsuba's scene, is built beforehand.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from shotenv.config import CameraConfig, SensorConfig, WorldConfig, find_config, read_config
-from shotenv.render import render_frame
+from shotenv.render import FrameRenderer
 from shotenv.render.llvm import start_mitsuba
 from shotenv.world import draw_world
 from shotenv.world.model import World
@@ -36,8 +36,8 @@ def run() -> list[dict[str, Any]]:
 
 
 def _race(world: World, camera: CameraConfig, sensor: SensorConfig) -> dict[str, Any]:
-    path = _path_render(world, camera)
-    times = alternating(lambda i: render_frame(world, 0.0, camera, sensor, seed=i), path, ROUNDS)
+    path, renderer = _path_render(world, camera), FrameRenderer(world, sensor)
+    times = alternating(lambda i: renderer.frame(0.0, camera, seed=i), path, ROUNDS)
     ratio = statistics.median(ours / theirs for ours, theirs in times)
     ours, theirs = (statistics.median(column) for column in zip(*times, strict=True))
     samples = (int(Shots.EIGHT) + camera.gray_instants) * camera.samples_per_pixel

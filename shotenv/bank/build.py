@@ -270,21 +270,20 @@ def _render_frames(
 
     Before the first frame comes a coarse look, as a light meter takes it.
     """
-    from shotenv.render import render_frame
+    from shotenv.render import FrameRenderer
     from shotenv.sensor.gray import gray_exposure_s
 
     camera, sensor = config.camera, config.sensor
     coarse = {"width": camera.width // METER_REDUCTION, "height": camera.height // METER_REDUCTION}
     meter = camera.model_copy(update=coarse)
-    frames = [render_frame(world, float(times[0]), meter, sensor, seed=_seed(seed, len(times)))]
+    renderer = FrameRenderer(world, sensor)
+    frames = [renderer.frame(float(times[0]), meter, seed=_seed(seed, len(times)))]
     for number, time in enumerate(times):
         light = torch.from_numpy(frames[-1].ambient).unsqueeze(0)
         exposure_s = float(gray_exposure_s(light, sensor))
         frame_seed = _seed(seed, number)
         frames.append(
-            render_frame(
-                world, float(time), camera, sensor, seed=frame_seed, gray_exposure_s=exposure_s
-            )
+            renderer.frame(float(time), camera, seed=frame_seed, gray_exposure_s=exposure_s)
         )
     return frames[1:]
 

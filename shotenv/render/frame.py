@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -39,35 +39,63 @@ class RenderedFrame:
     distance_m: np.ndarray
 
 
-def render_frame(
-    world: World,
-    time_s: float,
-    camera: CameraConfig,
-    sensor: SensorConfig,
-    *,
-    seed: int,
-    gray_exposure_s: float | None = None,
-) -> RenderedFrame:
-    """Render the frame of `world` whose first sample starts at `time_s`.
-
-    What moves is blurred in the ambient light over `gray_exposure_s` seconds, by default the
-    longest gray exposure.
+class FrameRenderer:
+    """Renders frames of one world; what stands still is built once.
 
     Raises
     ------
     RendererError
         Mitsuba or a usable LLVM library is missing.
     """
-    start_mitsuba()
-    from shotenv.render.integrator import trace
 
-    instants = frame_instants(time_s, camera, sensor, gray_exposure_s=gray_exposure_s)
-    weights = harmonic_weights(sensor.harmonic_strength, sensor.highest_harmonic)
-    traced = trace(world, instants, camera, harmonics=weights, seed=seed)
-    laser, passive = np.array(instants.laser), np.array(instants.passive)
-    return RenderedFrame(
-        correlation=traced.correlation[laser],
-        active=traced.active[laser].mean(axis=0),
-        ambient=traced.ambient[passive].mean(axis=0),
-        distance_m=traced.distance_m[0],
-    )
+    def __init__(self, world: World, sensor: SensorConfig) -> None:
+        start_mitsuba()
+        from shotenv.render.scene import StaticScene
+
+        self._world, self._sensor, self._static = world, sensor, StaticScene(world)
+        self._harmonics = harmonic_weights(sensor.harmonic_strength, sensor.highest_harmonic)
+
+    def frame(
+        self,
+        time_s: float,
+        camera: CameraConfig,
+        *,
+        seed: int,
+        gray_exposure_s: float | None = None,
+    ) -> RenderedFrame:
+        """The frame whose first sample starts at `time_s`.
+
+        What moves is blurred in the ambient light over `gray_exposure_s` seconds, by default the
+        longest gray exposure.
+        """
+        from shotenv.render.integrator import trace
+
+        instants = frame_instants(time_s, camera, self._sensor, gray_exposure_s=gray_exposure_s)
+        traced = trace(
+            self._world,
+            instants,
+            camera,
+            harmonics=self._harmonics,
+            seed=seed,
+            static=self._static,
+        )
+        laser, passive = np.array(instants.laser), np.array(instants.passive)
+        return RenderedFrame(
+            correlation=traced.correlation[laser],
+            active=traced.active[laser].mean(axis=0),
+            ambient=traced.ambient[passive].mean(axis=0),
+            distance_m=traced.distance_m[0],
+        )
+
+
+def render_frame(
+    world: World, time_s: float, camera: CameraConfig, sensor: SensorConfig, **options: Any
+) -> RenderedFrame:
+    """One frame of `world`; `options` are those of `FrameRenderer.frame`.
+
+    Raises
+    ------
+    RendererError
+        Mitsuba or a usable LLVM library is missing.
+    """
+    return FrameRenderer(world, sensor).frame(time_s, camera, **options)

@@ -22,7 +22,7 @@ from shotenv.render.light import PassiveLight
 from shotenv.render.modulation import FUNDAMENTAL, Harmonics, Modulation
 from shotenv.render.pinhole import Pinhole
 from shotenv.render.sampling import Lanes, Sampler
-from shotenv.render.scene import SURFACE_OFFSET_M, Hit, Scene
+from shotenv.render.scene import SURFACE_OFFSET_M, Hit, Scene, StaticScene
 from shotenv.world.model import World
 
 _RETRO_COS = 0.5
@@ -60,11 +60,13 @@ def trace(
     *,
     harmonics: Harmonics = FUNDAMENTAL,
     seed: int,
+    static: StaticScene | None = None,
 ) -> Traced:
     """Trace `camera.samples_per_pixel` paths per pixel and instant, in one kernel launch.
 
     The laser sits at the camera and shines evenly over the field of view. `harmonics` are those
-    of the correlation, see `unwrap.acquisition.harmonic_weights`. The result depends on the
+    of the correlation, see `unwrap.acquisition.harmonic_weights`; `static` is that of the same
+    world, where frames of it have been traced before. The result depends on the
     arguments alone, bit for bit on one machine.
     """
     lanes = Lanes.of(len(instants), camera)
@@ -76,7 +78,8 @@ def trace(
         dr.gather(mi.Bool, mi.Bool(list(instants.laser)), lanes.instant),
         dr.gather(mi.Bool, mi.Bool(list(instants.passive)), lanes.instant),
     )
-    scene = Scene(geometry_at(world, instants.times_s, camera.bounces))
+    geometry = geometry_at(world, instants.times_s, camera.bounces)
+    scene = Scene(geometry, StaticScene(world) if static is None else static)
     sampler = Sampler(lanes, instants, camera, seed=seed)
     light = _follow(scene, lights, lanes, camera.bounces, sampler)
     return _collect(light, lanes, len(instants), camera)

@@ -12,6 +12,7 @@ import numpy as np
 from shotenv.render.device import upload
 from shotenv.render.geometry import REACH_M, Geometry
 from shotenv.render.texture import noise_texture
+from shotenv.world.model import World
 
 SURFACE_OFFSET_M = 1e-3
 """How far from a surface a ray leaves it, so that it does not hit the surface itself."""
@@ -49,6 +50,13 @@ class _Near:
     corner_weight: Any
 
 
+class StaticScene:
+    """What stands still in a world, on the device: good for every frame of it."""
+
+    def __init__(self, world: World):
+        self.scene = _mitsuba_scene(world.static.corners)
+
+
 class Scene:
     """A `Geometry` on the device, ready for rays.
 
@@ -56,8 +64,8 @@ class Scene:
     the nearer of the two hits counts.
     """
 
-    def __init__(self, geometry: Geometry):
-        self._static = _mitsuba_scene(geometry.static)
+    def __init__(self, geometry: Geometry, static: StaticScene):
+        self._static = static.scene
         self._moving = _mitsuba_scene(geometry.moving)
         self._tile = upload(geometry.tile_m)
         self._normals = upload(geometry.normals)
@@ -69,7 +77,7 @@ class Scene:
         self._has_panes = dr.opaque(mi.Bool, len(geometry.panes) > 0)
         # A mesh cannot be empty.
         self._panes = _mitsuba_scene(geometry.panes if len(geometry.panes) else geometry.moving[:1])
-        self._static_faces = dr.opaque(mi.UInt32, len(geometry.static))
+        self._static_faces = dr.opaque(mi.UInt32, geometry.static_faces)
         self._moving_faces = dr.opaque(mi.UInt32, len(geometry.moving) // len(geometry.tile_m))
 
     def hit(self, origin, direction, instant, active, coherent: bool = False) -> Hit:

@@ -50,7 +50,7 @@ def stock_path(camera: CameraConfig) -> Any:
 
 def _triangles(world: World, time_s: float) -> Any:
     geometry = geometry_at(world, (time_s,), bounces=1)
-    corners = np.concatenate([geometry.static, geometry.moving - geometry.tile_m[0]])
+    corners = np.concatenate([world.static.corners, geometry.moving - geometry.tile_m[0]])
     first, along, across = np.split(geometry.uv[:, :6], 3, axis=1)
     low, high, *_ = geometry.surface.T
     return triangle_mesh(
