@@ -198,7 +198,7 @@ class RewardConfig(Section):
 
     error: NonNegative = Field(1.0, description="weight of the depth error term")
     duty: NonNegative = Field(0.005, description="weight of laser duty relative to always-8")
-    power: NonNegative = Field(0.015, description="weight of power relative to always-8")
+    power: NonNegative = Field(0.005, description="weight of power relative to always-8")
     trip: NonNegative = Field(0.5, description="weight of a frame without laser")
     error_scale_m: Positive = Field(
         4.0, description="error at which a pixel's term |e| / (|e| + scale) is one half, m"
