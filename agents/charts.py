@@ -20,6 +20,8 @@ FAMILY_COLORS = {
     "tunnel": "#cfd3dd",
     "night_road": "#b7bfdc",
 }
+LABEL_OFFSETS_PX = (50, 76, 102, 128, 154)
+"""Labels stand below the whiskers; policies of about the same energy have theirs apart."""
 FONT = {"family": "Inter, system-ui, 'Segoe UI', Roboto, sans-serif", "size": 13, "color": INK}
 CONFIG = {"displaylogo": False, "responsive": True, "displayModeBar": False}
 
@@ -32,7 +34,10 @@ def figure_html(figure: go.Figure) -> str:
 def error_against_energy(results: dict[str, Any]) -> go.Figure:
     """Depth error against laser energy, one marker with two intervals per policy."""
     figure = go.Figure()
-    for name, policy in results["policies"].items():
+    by_energy = sorted(
+        results["policies"].items(), key=lambda item: item[1]["laser_energy_j"]["mean"]
+    )
+    for place, (name, policy) in enumerate(by_energy):
         energy, error = policy["laser_energy_j"], policy["depth_mae_m"]
         chosen = name == results["scheduler"]
         color = ACCENT if chosen else MUTED
@@ -51,11 +56,12 @@ def error_against_energy(results: dict[str, Any]) -> go.Figure:
             y=error["mean"],
             text=f"<b>{label(name)}</b>" if chosen else label(name),
             font={"color": color, "size": 12},
-            showarrow=False,
-            xanchor="left",
-            yanchor="top" if chosen else "bottom",
-            xshift=7,
-            yshift=-4 if chosen else 4,
+            arrowcolor=color,
+            arrowwidth=0.8,
+            arrowhead=0,
+            standoff=7,
+            ax=0,
+            ay=LABEL_OFFSETS_PX[place % len(LABEL_OFFSETS_PX)],
         )
     figure.update_xaxes(title="laser energy per drive, J", rangemode="tozero", **AXIS)
     figure.update_yaxes(title="mean absolute depth error, m", rangemode="tozero", **AXIS)
