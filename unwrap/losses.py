@@ -7,11 +7,32 @@ Number of Shots (2023).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import torch
 from torch import Tensor
 
 EQUATION_7 = (0.5, 0.4, 0.1)
 """Weights of the scale-invariant, similarity and depth-guided terms."""
+
+
+@dataclass(frozen=True)
+class LossWeights:
+    """How the terms of a regression loss count.
+
+    Attributes
+    ----------
+    equation_7 : float
+        Weight of the paper's loss.
+    mean_share : float
+        See `scale_invariant_loss`; the paper's is 1.
+    wrap : float
+        Weight of `wrap_loss`; 0 in the paper.
+    """
+
+    equation_7: float = 1.0
+    mean_share: float = 1.0
+    wrap: float = 0.0
 
 
 def scale_invariant_loss(prediction: Tensor, truth: Tensor, mean_share: float = 1.0) -> Tensor:

@@ -8,13 +8,17 @@ scales all channels; 64 gives ResNet18's own.
 from __future__ import annotations
 
 from operator import add
-from typing import Any
+from typing import Self
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-NETWORKS = ("tofregnet", "tofsegnet")
+from unwrap.correction import SensorDescription
+from unwrap.losses import LossWeights, regression_loss, wrap_loss
+from unwrap.network import Network, Prediction, Settings
+from unwrap.sensed import Sensed, Truth
+
 STRIDE = 32
 """The body halves the image five times; inputs are padded to a multiple of this."""
 DARKEST = 1e-3
@@ -62,22 +66,23 @@ def stage(inputs: int, outputs: int, stride: int) -> nn.Sequential:
     return nn.Sequential(BasicBlock(inputs, outputs, stride), BasicBlock(outputs, outputs))
 
 
-class Autoencoder(nn.Module):
-    """Gray image to `outputs` maps at the input's resolution, for any height and width.
+class Autoencoder(Network):
+    """Images to `outputs` maps at the input's resolution, for any height and width.
 
     Parameters
     ----------
-    width : int
-        Channels of the first stage; the others have twice, four and eight times as many.
-    outputs : int
-        Maps per pixel.
+    settings : Settings
+        Of these `width`: channels of the first stage; the others have twice, four and eight times
+        as many.
+    inputs, outputs : int
+        Maps per pixel that the stem takes, and that come out.
     """
 
-    def __init__(self, width: int, outputs: int):
-        super().__init__()
-        self.width = width
+    def __init__(self, settings: Settings, inputs: int, outputs: int):
+        super().__init__(settings)
+        self.width = width = settings.width
         channels = (width, 2 * width, 4 * width, 8 * width)
-        self.stem = convolution(3, width, kernel=7, stride=2)
+        self.stem = convolution(inputs, width, kernel=7, stride=2)
         self.encoder = nn.ModuleList(
             stage(inputs, outputs, stride)
             for inputs, outputs, stride in zip(
@@ -92,10 +97,9 @@ class Autoencoder(nn.Module):
         # The last doubling rearranges channels into 2 x 2 pixels.
         self.head = nn.Conv2d(width // 2, 4 * outputs, 1)
 
-    def forward(self, gray: Tensor) -> Tensor:
-        """gray [B, 1, H, W] in [0, 1] -> [B, outputs, H, W]."""
-        height, width = gray.shape[-2:]
-        features = self.stem(describe(pad(gray)))
+    def forward(self, images: Tensor) -> Tensor:
+        """images [B, inputs, H, W], H and W multiples of `STRIDE` -> [B, outputs, H, W]."""
+        features = self.stem(images)
         skips = [features]
         features = functional.max_pool2d(features, 3, 2, 1)
         for encode in self.encoder:
@@ -104,15 +108,14 @@ class Autoencoder(nn.Module):
         features = skips.pop()
         for up, plain in zip(self.up, self.plain, strict=True):
             features = plain(torch.cat((up(features), skips.pop()), 1))
-        maps = functional.pixel_shuffle(self.head(features), 2)
-        return maps[..., :height, :width]
+        return functional.pixel_shuffle(self.head(features), 2)
 
 
-def pad(gray: Tensor) -> Tensor:
+def pad(images: Tensor) -> Tensor:
     """Repeat the last row and column until height and width are multiples of `STRIDE`."""
-    height, width = gray.shape[-2:]
+    height, width = images.shape[-2:]
     missing = (0, -width % STRIDE, 0, -height % STRIDE)
-    return functional.pad(gray, missing, mode="replicate") if any(missing) else gray
+    return functional.pad(images, missing, mode="replicate") if any(missing) else images
 
 
 def describe(gray: Tensor) -> Tensor:
@@ -129,37 +132,23 @@ def describe(gray: Tensor) -> Tensor:
     return features.contiguous(memory_format=torch.channels_last)
 
 
-def autocast(device: torch.device) -> torch.autocast:
-    """bfloat16 arithmetic inside the context where the device is faster with it."""
-    if device.type == "cuda":
-        supported = torch.cuda.is_bf16_supported()
-    else:
-        capabilities: dict = getattr(torch.cpu, "get_capabilities", dict)()
-        supported = capabilities.get("avx512_bf16", False)
-    return torch.autocast(device.type, torch.bfloat16, enabled=bool(supported))
+class GrayNetwork(Autoencoder):
+    """An autoencoder that looks at the gray image alone."""
+
+    def __init__(self, settings: Settings, outputs: int):
+        super().__init__(settings, 3, outputs)
+
+    def forward(self, gray: Tensor) -> Tensor:
+        """gray [B, 1, H, W] in [0, 1] -> [B, outputs, H, W], for any H and W."""
+        height, width = gray.shape[-2:]
+        return super().forward(describe(pad(gray)))[..., :height, :width]
+
+    def features(self, sensed: Sensed, sensor: SensorDescription) -> Tensor:
+        """The gray image."""
+        return sensed.gray.unsqueeze(1)
 
 
-@torch.inference_mode()
-def multiply_accumulates(network: nn.Module, height: int, width: int) -> int:
-    """Multiply-accumulate operations of the convolutions of one frame of `height` x `width`."""
-    counts = []
-
-    def count(layer: Any, inputs: tuple[Tensor], output: Tensor) -> None:
-        # Each weight is used once per output pixel, or per input pixel of a transposed layer.
-        pixels = inputs[0] if isinstance(layer, nn.ConvTranspose2d) else output
-        counts.append(layer.weight.numel() * pixels.shape[-2] * pixels.shape[-1])
-
-    layers = [m for m in network.modules() if isinstance(m, nn.Conv2d | nn.ConvTranspose2d)]
-    handles = [layer.register_forward_hook(count) for layer in layers]
-    try:
-        network(torch.zeros(1, 1, height, width, device=layers[0].weight.device))
-    finally:
-        for handle in handles:
-            handle.remove()
-    return sum(counts)
-
-
-class TofRegNet(Autoencoder):
+class TofRegNet(GrayNetwork):
     """Gray image to coarse depth in metres.
 
     Parameters
@@ -168,18 +157,48 @@ class TofRegNet(Autoencoder):
         Channels of the first ResNet stage.
     range_m : float
         Depths lie between 0 and this, metres.
+    f1_hz : float
+        Modulation frequency whose wraps are told apart.
     """
 
-    def __init__(self, width: int = 64, range_m: float = 30.0):
-        super().__init__(width, 1)
-        self.range_m = range_m
+    def __init__(self, width: int = 64, range_m: float = 30.0, f1_hz: float = 24e6):
+        super().__init__(Settings(width=width, range_m=range_m, f1_hz=f1_hz), 1)
+
+    @classmethod
+    def build(cls, settings: Settings) -> Self:
+        """Untrained."""
+        return cls(settings.width, settings.range_m, settings.f1_hz)
 
     def forward(self, gray: Tensor) -> Tensor:
         """gray [B, 1, H, W] in [0, 1] -> depth [B, H, W], metres, in (0, range_m)."""
-        return torch.sigmoid(super().forward(gray)[:, 0].float()) * self.range_m
+        return torch.sigmoid(super().forward(gray)[:, 0].float()) * self.settings.range_m
+
+    def loss(
+        self,
+        output: Tensor,
+        sensed: Sensed,
+        truth: Truth,
+        sensor: SensorDescription,
+        weights: LossWeights,
+    ) -> Tensor:
+        """Eq. 7 and our wrap loss; pixels of unknown truth count as right."""
+        truth_m = torch.where(truth.known, truth.distance_m, output.detach())
+        paper = regression_loss(
+            output, truth_m, range_m=self.settings.range_m, mean_share=weights.mean_share
+        )
+        ours = wrap_loss(output, truth_m, self.settings.unambiguous_m)
+        return weights.equation_7 * paper + weights.wrap * ours
+
+    def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
+        """The distance; its confidence is how far it lies from a wrap boundary.
+
+        0 on a boundary, 1 halfway between two.
+        """
+        cycles = output / self.settings.unambiguous_m
+        return Prediction(output, 2 * (cycles - cycles.round()).abs())
 
 
-class TofSegNet(Autoencoder):
+class TofSegNet(GrayNetwork):
     """Gray image to the logits of each pixel's wrap class; the last class is all beyond.
 
     Parameters
@@ -188,15 +207,47 @@ class TofSegNet(Autoencoder):
         Channels of the first ResNet stage.
     classes : int
         Wrap classes 0 .. classes - 1, each one unambiguous range wide.
+    f1_hz : float
+        Modulation frequency whose wraps are the classes.
     """
 
-    def __init__(self, width: int = 64, classes: int = 5):
-        super().__init__(width, classes)
-        self.classes = classes
+    def __init__(self, width: int = 64, classes: int = 5, f1_hz: float = 24e6):
+        super().__init__(Settings(width=width, classes=classes, f1_hz=f1_hz), classes)
+
+    @classmethod
+    def build(cls, settings: Settings) -> Self:
+        """Untrained."""
+        return cls(settings.width, settings.classes, settings.f1_hz)
 
     def forward(self, gray: Tensor) -> Tensor:
         """gray [B, 1, H, W] in [0, 1] -> logits [B, classes, H, W]."""
         return super().forward(gray).float()
+
+    def loss(
+        self,
+        output: Tensor,
+        sensed: Sensed,
+        truth: Truth,
+        sensor: SensorDescription,
+        weights: LossWeights,
+    ) -> Tensor:
+        """Cross entropy over the pixels of known truth."""
+        classes = wrap_classes(truth.distance_m, self.settings)
+        return functional.cross_entropy(output, classes.masked_fill(~truth.known, IGNORED))
+
+    def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
+        """A distance within the likeliest class (`class_depth_m`), and that class's probability."""
+        confidence = output.softmax(1).amax(1)
+        return Prediction(class_depth_m(output, self.settings.unambiguous_m), confidence)
+
+
+IGNORED = -100
+"""Class of a pixel that cross entropy leaves out."""
+
+
+def wrap_classes(depth_m: Tensor, settings: Settings) -> Tensor:
+    """Wrap class floor(depth / unambiguous range) of each pixel, the last one for all beyond."""
+    return (depth_m / settings.unambiguous_m).long().clamp(0, settings.classes - 1)
 
 
 def class_depth_m(logits: Tensor, unambiguous_m: float) -> Tensor:

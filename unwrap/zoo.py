@@ -1,0 +1,38 @@
+"""All networks by name. Peers are loaded when they are asked for."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import get_args
+
+from unwrap.network import Network, NetworkName, Settings
+
+NAMES: tuple[str, ...] = get_args(NetworkName)
+_PLACES = {
+    "tofregnet": "unwrap.nets:TofRegNet",
+    "tofsegnet": "unwrap.nets:TofSegNet",
+    "toffusionnet": "unwrap.fusion:TofFusionNet",
+    "su_net": "unwrap.peers.su:SuNet",
+    "phasenet": "unwrap.peers.phasenet:PhaseNet",
+    "agresti_net": "unwrap.peers.agresti:AgrestiNet",
+    "chen_net": "unwrap.peers.chen:ChenNet",
+}
+
+
+def network_class(name: str) -> type[Network]:
+    """Class of a network.
+
+    Raises
+    ------
+    ValueError
+        There is none of that name.
+    """
+    if name not in _PLACES:
+        raise ValueError(f"network is {name!r}; expected one of {', '.join(NAMES)}")
+    module, _, attribute = _PLACES[name].partition(":")
+    return getattr(import_module(module), attribute)
+
+
+def build(name: str, settings: Settings) -> Network:
+    """An untrained network, see `network_class`."""
+    return network_class(name).build(settings)
