@@ -1,0 +1,78 @@
+"""What networks see of correlation samples: phase, amplitude and saturation of each pixel at f1.
+
+With eight samples only the first four are looked at, so that what these maps tell is what the 2- and
+4-DCS frames tell.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from unwrap.correction import SensorDescription, decode_at
+from unwrap.frames import PhaseFrame, RawFrame
+from unwrap.phase import distance_m
+from unwrap.sensed import Sensed
+
+FULL_LOGARITHM = 8.0
+"""ln(1 + signal-to-noise) of the strongest signals, about 3000 : 1."""
+
+
+def samples_of(sensed: Sensed) -> RawFrame:
+    """The samples that the sensor delivered.
+
+    Raises
+    ------
+    ValueError
+        There are none.
+    """
+    if sensed.raw is None:
+        raise ValueError("sensed.raw is None; expected 2, 4 or 8 samples")
+    return sensed.raw
+
+
+def first_phase(sensed: Sensed, sensor: SensorDescription) -> PhaseFrame:
+    """Phase [B, H, W] at f1, with the offset, the wiggle and the shift removed that are known."""
+    raw, shift_m = samples_of(sensed), sensed.shift_m
+    return decode_at(0, raw, sensor, offset_lsb=sensed.offset_lsb, shift_m=shift_m)
+
+
+def wrapped_distance_m(sensed: Sensed, sensor: SensorDescription) -> Tensor:
+    """Distance [B, H, W] within one unambiguous range of f1, metres."""
+    return distance_m(first_phase(sensed, sensor).phase_rad, sensor.f1_hz)
+
+
+def noise_of(sensed: Sensed, sensor: SensorDescription) -> Tensor | float:
+    """Standard deviation of one sample, LSB: the sensor's estimate, else its noise in the dark."""
+    return sensor.noise_lsb if sensed.noise_lsb is None else sensed.noise_lsb
+
+
+def compressed(signal_to_noise: Tensor) -> Tensor:
+    """Logarithm of ratios from 0 to about 3000, scaled to [-1, 1].
+
+    >>> compressed(torch.tensor([0.0, 2980.0]))
+    tensor([-1.,  1.])
+    """
+    return signal_to_noise.log1p() * (2 / FULL_LOGARITHM) - 1.0
+
+
+def phase_maps(sensed: Sensed, sensor: SensorDescription) -> Tensor:
+    """Cosine and sine of the phase, compressed amplitude over noise, and saturation.
+
+    The phase is given by its vector, which does not jump where it wraps.
+
+    Returns
+    -------
+    float32 [B, 4, H, W]
+        The first two in [-1, 1], the third in about [-1, 1], see `compressed`; the last 0 or 1.
+
+    Raises
+    ------
+    ValueError
+        There are no samples.
+    """
+    frame = first_phase(sensed, sensor)
+    ratio = frame.amplitude / noise_of(sensed, sensor)
+    saturated = samples_of(sensed).saturated.to(ratio)
+    maps = (frame.phase_rad.cos(), frame.phase_rad.sin(), compressed(ratio), saturated)
+    return torch.stack(maps, 1)
