@@ -1,6 +1,6 @@
 """What networks see of correlation samples: phase, amplitude and saturation of each pixel at f1.
 
-With eight samples only the first four are looked at, so that what these maps tell is what the 2- and
+With eight samples only the first four are looked at, so that these maps tell what the 2- and
 4-DCS frames tell.
 """
 
