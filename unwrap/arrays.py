@@ -1,0 +1,86 @@
+"""Arrays from files that may be anything: never unpickled, looked at before memory is taken."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from collections.abc import Collection
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+from numpy.lib import format as npy
+
+MAX_BYTES = 1 << 28
+"""Largest file, and largest sum of the arrays in one."""
+_HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+_BROKEN = (
+    *(OSError, ValueError, TypeError, KeyError, EOFError, SyntaxError, RecursionError),
+    *(OverflowError, NotImplementedError, RuntimeError, zipfile.BadZipFile),
+)
+"""What reading damaged files raises."""
+
+
+def read_arrays(path: Path, alone: str, known: Collection[str]) -> dict[str, np.ndarray]:
+    """Arrays of an `.npz` file by name, or the array of an `.npy` file under the name `alone`.
+
+    Parameters
+    ----------
+    known : collection of str
+        Names that an `.npz` file may hold; another is refused, since it may be a misspelt one.
+
+    Raises
+    ------
+    ValueError
+        The file is missing, damaged, too large, pickled or of another kind; the message names it.
+    """
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise ValueError(f"larger than {MAX_BYTES >> 20} MiB")
+        if path.suffix == ".npz":
+            return _read_npz(path, known)
+        if path.suffix != ".npy":
+            raise ValueError("expected an .npy or .npz file")
+        with path.open("rb") as file:
+            return {alone: _read_npy(file, size)}
+    except _BROKEN as error:
+        absent = isinstance(error, FileNotFoundError)
+        raise ValueError(f"{path}: {'no such file' if absent else reason(error)}") from None
+
+
+def reason(error: Exception) -> str:
+    """What an error says, in one line; its name where it says nothing."""
+    return " ".join(str(error).split())[:200] or type(error).__name__
+
+
+def _read_npz(path: Path, known: Collection[str]) -> dict[str, np.ndarray]:
+    with zipfile.ZipFile(path) as archive:
+        members = {entry.filename.removesuffix(".npy"): entry for entry in archive.infolist()}
+        unknown = [name for name in members if name not in known]
+        if unknown:
+            raise ValueError(f"holds {unknown[0]!r}; expected some of {', '.join(known)}")
+        if sum(entry.file_size for entry in archive.infolist()) > MAX_BYTES:
+            raise ValueError(f"unpacks to more than {MAX_BYTES >> 20} MiB")
+        arrays = {}
+        for name, entry in members.items():
+            with archive.open(entry) as file:
+                arrays[name] = _read_npy(file, entry.file_size)
+        return arrays
+
+
+def _read_npy(file: IO[bytes], size: int) -> np.ndarray:
+    """One array; its header must promise exactly the bytes that follow."""
+    version = npy.read_magic(file)
+    if version not in _HEADERS:
+        raise ValueError(f"npy version {version}; expected (1, 0) or (2, 0)")
+    shape, _, dtype = _HEADERS[version](file)
+    if dtype.hasobject:
+        raise ValueError("holds pickled objects, which are never read; expected plain numbers")
+    promised, following = math.prod(shape) * dtype.itemsize, size - file.tell()
+    if promised != following or any(length < 1 for length in shape):
+        raise ValueError(
+            f"its header promises {dtype} {shape}, {promised} bytes; {following} bytes follow"
+        )
+    file.seek(0)
+    return npy.read_array(file, allow_pickle=False)
