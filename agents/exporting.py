@@ -1,0 +1,156 @@
+"""`shotenv unwrap export`: a network as an ONNX file, checked against torch before it stands."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from jsonargparse import ArgumentParser, Namespace
+from torch import Tensor
+
+from agents.export_frames import ExportFrames, choose_bank, export_frames
+from agents.onnx_files import OPSET, Exported, quantised, run, run_torch, to_onnx
+from shotenv.config import SensorConfig, find_config, read_config
+from shotenv.problem import describe
+from unwrap.correction import Merge
+from unwrap.files import write_bytes
+from unwrap.phase import unambiguous_range_m
+from unwrap.unwrapper import Unwrapper, load_unwrapper
+
+CHECKED_FRAMES, CALIBRATION_FRAMES = 16, 32
+LEAST_SAME_WRAPS = 0.999
+"""Share of pixels that must have torch's own wrap."""
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Arguments of `shotenv unwrap export`."""
+    parser.add_argument("unwrapper", help="name or path of a network")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE.onnx")
+    parser.add_argument("--height", type=int, default=240, help="pixels down")
+    parser.add_argument("--width", type=int, default=320, help="pixels across")
+    parser.add_argument("--sensor", default="epc660", help="name or path of a sensor configuration")
+    parser.add_argument("--merge", type=Merge, default="nearest", help="nearest, or floor (eq. 6)")
+    parser.add_argument("--int8", action="store_true", help="write FILE.int8.onnx, quantised, too")
+    parser.add_argument(
+        "--check-bank",
+        metavar="BANK",
+        help="name or path of a bank to check and calibrate with, or none: made-up images "
+        "(default: starter where it is rendered, else none)",
+    )
+
+
+def export_files(arguments: Namespace) -> dict[str, Any]:
+    """Export the network that the arguments name, tell and return the numbers of the check.
+
+    Raises
+    ------
+    ValueError
+        A network, sensor, bank or size that is of no use, or a file that disagrees with torch,
+        which is not written then.
+    """
+    config = read_config(SensorConfig, find_config("sensor", arguments.sensor))
+    unwrapper, size = load_unwrapper(arguments.unwrapper), _size(arguments)
+    exported = Exported(unwrapper, describe(config), arguments.merge).eval()
+    bank = choose_bank(arguments.check_bank, config)
+    frames = export_frames(bank, "test", CHECKED_FRAMES, size, config.f1_hz)
+    content = to_onnx(exported, size, metadata_of(unwrapper, exported, config, size))
+    judge = Judge(frames, config, run_torch(exported, frames))
+    found: dict[str, Any] = {
+        "frames": frames.source,
+        "opset": OPSET,
+        "onnx": judge(run(content, frames)),
+    }
+    require_agreement(found["onnx"]["same_wraps"])
+    _write(arguments.out, content, found["onnx"])
+    if arguments.int8:
+        training = export_frames(bank, "train", CALIBRATION_FRAMES, size, config.f1_hz)
+        small = quantised(content, training)
+        found["int8"] = {"calibration": training.source, **judge(run(small, frames))}
+        _write(arguments.out.with_suffix(".int8.onnx"), small, found["int8"])
+    return found
+
+
+def _size(arguments: Namespace) -> tuple[int, int]:
+    for name in ("height", "width"):
+        if not 16 <= arguments[name] <= 4096:
+            raise ValueError(f"{name} is {arguments[name]}; expected 16 to 4096 pixels")
+    return arguments.height, arguments.width
+
+
+def metadata_of(
+    unwrapper: Unwrapper, exported: Exported, sensor: SensorConfig, size: tuple[int, int]
+) -> dict[str, str]:
+    """What is stored with the file: where it comes from and what its inputs mean."""
+    values = {
+        "network": unwrapper.name,
+        "width": unwrapper.metadata["width"],
+        "fingerprint": unwrapper.fingerprint,
+        "shotenv_version": version("shotenv"),
+        "sensor": sensor.name,
+        "f1_hz": sensor.f1_hz,
+        "unambiguous_m": unambiguous_range_m(sensor.f1_hz),
+        "saturation_range_m": sensor.saturation_range_m,
+        "merge": exported.merge,
+        "image_height": size[0],
+        "image_width": size[1],
+    }
+    return {name: str(value) for name, value in values.items()}
+
+
+class Judge:
+    """Compares outputs with torch's, and with the truth where it is known.
+
+    Parameters
+    ----------
+    frames : ExportFrames
+    sensor : SensorConfig
+        Of it the frequency and the range that is scored.
+    reference : list of Tensor
+        Torch's outputs.
+    """
+
+    def __init__(self, frames: ExportFrames, sensor: SensorConfig, reference: list[Tensor]):
+        self.frames, self.sensor, self.reference = frames, sensor, reference
+
+    def __call__(self, outputs: list[Tensor]) -> dict[str, Any]:
+        """Shares of equal wraps, differences of the predicted distance, and both accuracies."""
+        apart_m = (outputs[0] - self.reference[0]).abs()
+        return {
+            "same_wraps": (outputs[1] == self.reference[1]).double().mean().item(),
+            "mean_difference_m": apart_m.mean().item(),
+            "largest_difference_m": apart_m.max().item(),
+            "wrap_accuracy": self._accuracy(outputs[1]),
+            "wrap_accuracy_torch": self._accuracy(self.reference[1]),
+        }
+
+    def _accuracy(self, wraps: Tensor) -> float | None:
+        """Share of pixels within the range with the true wrap; None without truth."""
+        truth_m = self.frames.truth_m
+        if truth_m is None:
+            return None
+        turns = (truth_m - self.frames.wrapped_m) / unambiguous_range_m(self.sensor.f1_hz)
+        near = truth_m <= self.sensor.max_range_m
+        return (wraps == turns.round())[near].double().mean().item()
+
+
+def require_agreement(same_wraps: float) -> None:
+    """Raise ValueError unless the share of equal wraps is enough."""
+    if not same_wraps >= LEAST_SAME_WRAPS:
+        raise ValueError(
+            f"onnxruntime and torch agree on the wrap of {100 * same_wraps:.3f} % of the pixels; "
+            f"expected at least {100 * LEAST_SAME_WRAPS:g} %; nothing was written"
+        )
+
+
+def _write(path: Path, content: bytes, found: dict[str, Any]) -> None:
+    write_bytes(path, content)
+    found["file"], found["bytes"] = str(path), len(content)
+    told = f"{path}: {len(content) / 1e6:.1f} MB, same wrap as torch in "
+    told += f"{100 * found['same_wraps']:.3f} % of the pixels"
+    if found["wrap_accuracy"] is not None:
+        told += (
+            f"; right wrap in {100 * found['wrap_accuracy']:.2f} %, "
+            f"torch {100 * found['wrap_accuracy_torch']:.2f} %"
+        )
+    print(told)
