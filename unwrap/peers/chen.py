@@ -12,7 +12,7 @@ from unwrap.calibration import wrapped
 from unwrap.correction import SensorDescription
 from unwrap.losses import LossWeights
 from unwrap.merge import nearest_wraps
-from unwrap.nets import IGNORED, Autoencoder, class_depth_m, pad, wrap_classes
+from unwrap.nets import Autoencoder, class_depth_m, pad, wrap_classes
 from unwrap.network import Prediction, Settings
 from unwrap.peers.inputs import PLANES, mean_of_known, sample_planes
 from unwrap.phase import TWO_PI, distance_m
@@ -69,8 +69,9 @@ class ChenNet(Autoencoder):
         phase = truth.distance_m * (TWO_PI / self.settings.unambiguous_m)
         aligned = output[:, 0] * phase.cos() + output[:, 1] * phase.sin()
         met = truth.known & (truth.distance_m < self.settings.range_m)
-        classes = wrap_classes(truth.distance_m, self.settings).masked_fill(~truth.known, IGNORED)
-        return mean_of_known(1 - aligned, met) + functional.cross_entropy(output[:, 2:], classes)
+        classes = wrap_classes(truth.distance_m, self.settings)
+        unlikely = functional.cross_entropy(output[:, 2:], classes, reduction="none")
+        return mean_of_known(1 - aligned, met) + mean_of_known(unlikely, truth.known)
 
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         """The clean phase's wrap candidate nearest to `class_depth_m`.

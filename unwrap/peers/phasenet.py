@@ -12,8 +12,9 @@ from unwrap.correction import SensorDescription
 from unwrap.inputs import first_phase, wrapped_distance_m
 from unwrap.losses import LossWeights
 from unwrap.merge import nearest_wraps
-from unwrap.nets import IGNORED, convolution, pad
+from unwrap.nets import convolution, pad
 from unwrap.network import Network, Prediction, Settings
+from unwrap.peers.inputs import mean_of_known
 from unwrap.sensed import Sensed, Truth
 
 
@@ -72,7 +73,9 @@ class PhaseNet(Network):
     ) -> Tensor:
         """Cross entropy over the pixels of known truth; `weights` are of the project's own loss."""
         counts = self.wrap_counts(truth.distance_m, wrapped_distance_m(sensed, sensor))
-        return functional.cross_entropy(output, counts.masked_fill(~truth.known, IGNORED))
+        return mean_of_known(
+            functional.cross_entropy(output, counts, reduction="none"), truth.known
+        )
 
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         """Likeliest count times the unambiguous range plus the wrapped distance.
