@@ -31,6 +31,8 @@ __all__ = ["Outcome", "Outcomes", "Problem", "Seen", "State", "observe", "open_p
 __all__ += ["outcomes_of_all_actions", "reset", "step"]
 
 SHOTS_OF_ACTION = torch.tensor([int(shots) for shots in Shots])
+FEWER = torch.tensor([[int(shots < least) for least in (4, 8)] for shots in range(9)])
+"""Whether a number of samples is less than 4, and less than 8; 1 or 0."""
 NEVER = 1000
 """Frames since an acquisition that has not been made."""
 RECENT_S = 1.0
@@ -49,18 +51,16 @@ class Seen:
         Of the last acquisition that could tell, see `SEEN_FEATURES`; 0 before the first.
     shots : int64 [B]
         Of the last frame; 0 without laser, or before the first frame.
-    since_four, since_eight : int64 [B]
+    since : int64 [B, 2]
         Frames since the last one with at least 4, and with 8 shots.
-    duty, power : float64 [B]
-        Exponential averages over `RECENT_S`, relative to always 8.
+    used : float64 [B, 2]
+        Exponential averages of duty and power over `RECENT_S`, relative to always 8.
     """
 
     features: Tensor
     shots: Tensor
-    since_four: Tensor
-    since_eight: Tensor
-    duty: Tensor
-    power: Tensor
+    since: Tensor
+    used: Tensor
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def reset(problem: Problem, seeds: Sequence[int]) -> State:
     drive = concatenate(
         [draw_drive(s, problem.config, problem.clips, bank.height, bank.width) for s in seeds]
     )
-    zero, none = torch.zeros(len(seeds), dtype=torch.float64), torch.zeros(len(seeds)).long()
+    none = torch.zeros(len(seeds), dtype=torch.int64)
     return State(
         drive=drive,
         step=none,
@@ -125,10 +125,8 @@ def reset(problem: Problem, seeds: Sequence[int]) -> State:
         seen=Seen(
             features=torch.zeros(len(seeds), len(SEEN_FEATURES)),
             shots=none,
-            since_four=none + NEVER,
-            since_eight=none + NEVER,
-            duty=zero,
-            power=zero,
+            since=torch.full((len(seeds), 2), NEVER),
+            used=torch.zeros(len(seeds), 2, dtype=torch.float64),
         ),
     )
 
@@ -233,10 +231,8 @@ def _remember(
     return Seen(
         features=features,
         shots=shots,
-        since_four=(seen.since_four + 1).masked_fill(shots >= Shots.FOUR, 0),
-        since_eight=(seen.since_eight + 1).masked_fill(shots >= Shots.EIGHT, 0),
-        duty=seen.duty + share * (terms["duty"] - seen.duty),
-        power=seen.power + share * (terms["power"] - seen.power),
+        since=(seen.since + 1).mul_(FEWER.index_select(0, shots)),
+        used=seen.used.lerp(torch.stack((terms["duty"], terms["power"]), dim=1), share),
     )
 
 
@@ -254,17 +250,16 @@ def observe(problem: Problem, state: State) -> Tensor:
     temperature_k, tripped = state.laser.temperature_k, state.laser.tripped
     now, before = drive.frame(state.step), drive.frame((state.step - 1).clamp(min=0))
     margin_k = torch.where(tripped, laser.release_k, laser.trip_k) - temperature_k
+    recently = 1.0 - torch.exp(seen.since / -16.0)
     columns = (
         gray_change(problem.scenes, before, now),
         seen.shots == Shots.TWO,
         seen.shots == Shots.FOUR,
         seen.shots == Shots.EIGHT,
-        1.0 - torch.exp(seen.since_four / -16.0),
-        1.0 - torch.exp(seen.since_eight / -16.0),
+        *recently.unbind(1),
         (temperature_k - laser.release_k) / 20.0,
         heat_margin(margin_k),
-        seen.duty,
-        seen.power,
+        *seen.used.unbind(1),
         1.0 - state.step * (2.0 / problem.config.frames_per_drive),
     )
     current = torch.stack([column.to(torch.float32) for column in columns], dim=1)

@@ -117,8 +117,8 @@ def scored_pixels(electrons: Electrons, truth_m: Tensor, problem: Problem) -> Te
     """Pixels that count, 1 or 0: truth within the range, single-sample signal to noise enough."""
     sensor = problem.config.sensor
     strong = single_sample_snr(electrons, sensor).gt_(sensor.min_snr)
-    # In place a comparison stays float32, which is vectorised; a bool result is not.
-    return truth_m.clone().le_(sensor.max_range_m).mul_(strong)
+    # A comparison into float32 is vectorised; into a bool it is not.
+    return torch.le(truth_m, sensor.max_range_m, out=torch.empty_like(truth_m)).mul_(strong)
 
 
 def measure(
@@ -150,13 +150,12 @@ def seen_by_sensor(made: Acquisition, valid: Tensor, shots: Shots) -> Tensor:
 
     `valid` [B, H, W] is that of the depth, as 0 and 1.
     """
-    four_sigma = 4.0 * made.noise_lsb
     amplitude, residual = made.depth.amplitude, made.depth.residual
     pixels = amplitude.shape[1] * amplitude.shape[2]
     saturated = weights_of(made.raw.saturated)
-    maps = [amplitude, _bounded(amplitude, four_sigma), valid, saturated]
+    maps = [amplitude, _above_noise(amplitude, made.noise_lsb), valid, saturated]
     if residual is not None:
-        maps.append(_bounded(residual, four_sigma))
+        maps.append(_above_noise(residual, made.noise_lsb))
     if shots == Shots.EIGHT:
         apart_m = (made.depth.distance_m - made.predicted_m).abs_()
         maps.append((apart_m / (apart_m + 1.0)).mul_(valid))
@@ -169,6 +168,6 @@ def seen_by_sensor(made: Acquisition, valid: Tensor, shots: Shots) -> Tensor:
     return seen.T.to(torch.float32)
 
 
-def _bounded(value: Tensor, scale: Tensor) -> Tensor:
-    """value / (value + scale), 0..1."""
-    return value / (value + scale)
+def _above_noise(signal_lsb: Tensor, noise_lsb: Tensor) -> Tensor:
+    """q / (q + 1), 0..1, where q is the signal over 4 sigma."""
+    return signal_lsb / torch.add(signal_lsb, noise_lsb, alpha=4.0)

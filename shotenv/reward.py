@@ -9,6 +9,7 @@ from torch import Tensor
 
 from shotenv.config import RewardConfig
 from shotenv.frames import ShotCost
+from unwrap.merge import below
 
 TERMS = ("error", "duty", "power", "tripped")
 """Order of the reward terms, also in `info["vector_reward"]`; each lies in 0..1."""
@@ -48,7 +49,10 @@ def frame_sums(*maps: Tensor) -> Tensor:
     Row by row, because a sum over a whole frame at once is split among threads, and then its
     last bit depends on how many there are.
     """
-    return torch.stack([values.sum(dim=-1) for values in maps]).sum(dim=-1, dtype=torch.float64)
+    rows = maps[0].new_empty(len(maps), *maps[0].shape[:-1])
+    for row, values in zip(rows.unbind(0), maps, strict=True):
+        torch.sum(values, dim=-1, out=row)
+    return rows.sum(dim=-1, dtype=torch.float64)
 
 
 FARTHEST_ERROR_M = 1e9
@@ -75,22 +79,20 @@ def score_depth(
     error_m = error_m.nan_to_num_(FARTHEST_ERROR_M, FARTHEST_ERROR_M)
     good_error_m = error_m * good
     sums = frame_sums(
-        counted,
-        good,
         (error_m * counted).div_(error_m + error_scale_m),
+        below(error_m, 0.5 * unambiguous_m).mul_(good),
+        good,
+        counted,
         good_error_m,
-        error_m.mul(good_error_m),
-        error_m.lt_(0.5 * unambiguous_m).mul_(good),
+        error_m.mul_(good_error_m),
     )
-    count, bounded, absolute_m, squared_m2, right = sums[:2], *sums[2:].unbind()
-    (nothing, none_good), (divisor, good_divisor) = count == 0, count.clamp(min=1)
-    return DepthScore(
-        error=bounded / divisor,
-        depth_mae_m=(absolute_m / good_divisor).masked_fill_(none_good, range_m),
-        depth_rmse_m=(squared_m2 / good_divisor).sqrt_().masked_fill_(none_good, range_m),
-        wrap_accuracy=(right / divisor).masked_fill_(nothing, 1.0),
-        valid_share=(count[1] / divisor).masked_fill_(nothing, 1.0),
-    )
+    _, _, good_count, count, *_ = sums.unbind()
+    shares, means_m = sums[:3] / count.clamp(min=1), sums[4:] / good_count.clamp(min=1)
+    shares[1:].masked_fill_(count == 0, 1.0)
+    means_m[1].sqrt_()
+    means_m.masked_fill_(good_count == 0, range_m)
+    (error, right, valid_share), (absolute_m, squared_m) = shares.unbind(), means_m.unbind()
+    return DepthScore(error, absolute_m, squared_m, right, valid_share)
 
 
 def no_depth(batch: int, range_m: float) -> DepthScore:
@@ -126,5 +128,7 @@ def weights(config: RewardConfig) -> dict[str, float]:
 
 def reward(terms: dict[str, Tensor], config: RewardConfig) -> Tensor:
     """Minus the weighted sum of the terms, float64 [B]."""
-    weighted = [weight * terms[name] for name, weight in weights(config).items()]
-    return -torch.stack(weighted).sum(dim=0)
+    total = torch.zeros_like(terms["error"])
+    for name, weight in weights(config).items():
+        total.sub_(terms[name], alpha=weight)
+    return total

@@ -18,6 +18,7 @@ from unwrap.calibration import (
     wrapped,
     write_wiggle,
 )
+from unwrap.frames import PhaseFrame
 from unwrap.phase import BELOW_TWO_PI, TWO_PI, decode
 
 PERIOD = torch.arange(20_000, dtype=torch.float64) * (TWO_PI / 20_000)
@@ -26,6 +27,12 @@ PERIOD = torch.arange(20_000, dtype=torch.float64) * (TWO_PI / 20_000)
 def apart(a, b):
     """Signed difference of phases, in [-pi, pi)."""
     return torch.remainder(a - b + math.pi, TWO_PI) - math.pi
+
+
+def removed_by(table, phase_rad):
+    """Phase error that the table removes from decoded phases."""
+    frame = PhaseFrame(phase_rad, torch.ones_like(phase_rad), None)
+    return apart(phase_rad, table.corrected(frame).phase_rad)
 
 
 def decoded(phase_rad, weights, count=4):
@@ -69,7 +76,7 @@ def test_the_curve_of_a_triangle_is_its_arc_tangent():
     found = decoded(phase, harmonic_weights(1.0, 2001)).phase_rad[0]
     assert (found - torch.atan2(x, 1 - x)).abs().max() < 1e-3
     table = wiggle_of(harmonic_weights(1.0, 2001))
-    assert (table.error_of(found) - (found - phase)).abs().max() < 3e-4
+    assert (removed_by(table, found) - (found - phase)).abs().max() < 3e-4
 
 
 @pytest.mark.parametrize("weights", [harmonic_weights(1.0, 7), harmonic_weights(0.3, 31)])
@@ -100,14 +107,23 @@ def test_a_share_of_the_table_leaves_the_rest():
         assert (left - (1 - share) * before).abs().max() < 3e-4
 
 
-def test_the_table_is_linear_between_its_entries_and_periodic():
-    table = WiggleTable((0.0, 0.1, -0.2, 0.3))
-    quarter = math.pi / 2
-    phase = torch.tensor([0.0, 0.5, 1.0, 1.25, 3.0, 3.5, 3.75]) * quarter
-    expected = torch.tensor([0.0, 0.05, 0.1, 0.025, 0.3, 0.15, 0.075])
-    torch.testing.assert_close(table.error_of(phase), expected, rtol=0, atol=1e-6)
-    edge = torch.tensor([[BELOW_TWO_PI]])
-    assert table.error_of(edge).abs().max() < 1e-5
+@pytest.mark.parametrize("errors", [(0.0, 0.1, -0.2, 0.3), (0.0, 0.1, -0.2, 0.3, 0.2)])
+def test_the_table_is_linear_between_its_entries_and_periodic(errors):
+    """Whether a phase is given in [0, 2 pi) or in [-pi, pi], and with an odd number of entries."""
+    table, bin_rad = WiggleTable(errors), TWO_PI / len(errors)
+    places = torch.tensor([0.0, 0.5, 1.0, 1.25, 3.0])
+    expected = torch.tensor([0.0, 0.05, 0.1, 0.025, 0.3])
+    found = removed_by(table, places * bin_rad)
+    torch.testing.assert_close(found, expected, rtol=0, atol=2e-6)
+    last = removed_by(table, torch.tensor([len(errors) - 0.5]) * bin_rad)
+    assert float(last) == pytest.approx(errors[-1] / 2, abs=2e-6)
+    below_zero = (places - len(errors)) * bin_rad
+    turned = table.turns_of(below_zero[below_zero >= -math.pi]) * TWO_PI
+    assert len(turned)
+    torch.testing.assert_close(
+        below_zero[-len(turned) :] - turned, expected[-len(turned) :], rtol=0, atol=2e-6
+    )
+    assert removed_by(table, torch.tensor([[BELOW_TWO_PI]])).abs().max() < 1e-5
 
 
 def test_wrapped_phases_stay_below_two_pi():

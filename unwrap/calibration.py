@@ -19,7 +19,7 @@ from torch import Tensor
 
 from unwrap.files import write_json
 from unwrap.frames import PhaseFrame
-from unwrap.phase import BELOW_TWO_PI, TWO_PI, decode, unambiguous_range_m
+from unwrap.phase import BELOW_TWO_PI, TWO_PI, decode, phase_of_turns, unambiguous_range_m
 
 BINS = 256
 LARGEST_FILE_BYTES = 2**20
@@ -48,23 +48,37 @@ class WiggleTable:
         """The table that removes `share` of what this one does."""
         return WiggleTable(tuple(share * error for error in self.error_rad))
 
+    @property
+    def _first(self) -> int:
+        """Bins from the first line, at a phase of -pi or just below it, to phase 0."""
+        return (len(self.error_rad) + 1) // 2
+
     @cached_property
     def _lines(self) -> Tensor:
-        """One line a + b x per bin, [2, n + 1]; the last is for phases that round up to 2 pi."""
-        errors = torch.tensor((*self.error_rad, *self.error_rad[:2]), dtype=torch.float64)
-        slopes = errors.diff()
-        return torch.stack((errors[:-1] - slopes * torch.arange(len(slopes)), slopes))
+        """True turns a + b x at the place x of a phase in bins, one line per bin, [2, bins].
 
-    def error_of(self, phase_rad: Tensor) -> Tensor:
-        """Phase error, of the shape of the decoded phases in [0, 2 pi)."""
-        place = (phase_rad * (len(self.error_rad) / TWO_PI)).flatten()
-        index = place.to(torch.int32)
-        start, slope = (part.index_select(0, index) for part in self._lines.to(place))
-        return torch.addcmul(start, slope, place).view(phase_rad.shape)
+        From -pi to 2 pi and a bin beyond, which is that of phases that round up.
+        """
+        count, first = len(self.error_rad), self._first
+        place = torch.arange(first + count + 2, dtype=torch.float64)
+        errors = torch.tensor(self.error_rad, dtype=torch.float64).roll(first)
+        errors = errors[place.long() % count] / TWO_PI
+        turns = (place - first) / count - errors
+        slopes = turns.diff()
+        return torch.stack((turns[:-1] - slopes * place[:-1], slopes))
+
+    def turns_of(self, phase_rad: Tensor) -> Tensor:
+        """Phases without their error in turns, of the shape of decoded ones in [-pi, 2 pi)."""
+        lines = self._lines.to(phase_rad)
+        start = lines.new_tensor(self._first)
+        place = torch.add(start, phase_rad, alpha=len(self.error_rad) / TWO_PI).flatten()
+        constant, slope = lines.index_select(1, place.to(torch.int32)).unbind(0)
+        return torch.addcmul(constant, slope, place).view(phase_rad.shape)
 
     def corrected(self, frame: PhaseFrame) -> PhaseFrame:
         """`frame` with the phase error removed."""
-        return replace(frame, phase_rad=wrapped(frame.phase_rad - self.error_of(frame.phase_rad)))
+        turns = self.turns_of(frame.phase_rad).add_(1.0)
+        return replace(frame, phase_rad=phase_of_turns(turns))
 
 
 def shifted(frame: PhaseFrame, shift_m: Tensor, frequency_hz: float) -> PhaseFrame:
@@ -72,8 +86,14 @@ def shifted(frame: PhaseFrame, shift_m: Tensor, frequency_hz: float) -> PhaseFra
 
     What a delay does to the samples of a sine, 4 pi f shift / c on the phase.
     """
-    turn_rad = (shift_m * (TWO_PI / unambiguous_range_m(frequency_hz))).to(frame.phase_rad.dtype)
-    return replace(frame, phase_rad=wrapped(frame.phase_rad + turn_rad.view(-1, 1, 1)))
+    turns = shift_turns(shift_m, frequency_hz).to(frame.phase_rad)
+    turned = torch.add(turns, frame.phase_rad, alpha=1 / TWO_PI)
+    return replace(frame, phase_rad=phase_of_turns(turned))
+
+
+def shift_turns(shift_m: Tensor, frequency_hz: float) -> Tensor:
+    """Turns [B, 1, 1] in [1, 2] by which `shift_m` [B] advances the phase, up to whole ones."""
+    return (shift_m / unambiguous_range_m(frequency_hz)).remainder(1.0).add_(1.0).view(-1, 1, 1)
 
 
 def wrapped(phase_rad: Tensor) -> Tensor:

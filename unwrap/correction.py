@@ -14,11 +14,11 @@ import torch
 from torch import Tensor
 
 from unwrap.acquisition import SAMPLES_PER_FREQUENCY, Shots
-from unwrap.calibration import WiggleTable, shifted
+from unwrap.calibration import WiggleTable, shift_turns
 from unwrap.dual import unwrap_dual
 from unwrap.frames import DepthFrame, PhaseFrame, RawFrame
 from unwrap.merge import merge_nearest, merge_regression, weights_of
-from unwrap.phase import decode, distance_m, unambiguous_range_m
+from unwrap.phase import TWO_PI, decode_angle, distance_m, phase_of_turns, unambiguous_range_m
 
 Merge = Literal["nearest", "floor"]
 MERGES: dict[Merge, Callable[[Tensor, Tensor, float, float], Tensor]] = {
@@ -103,7 +103,7 @@ def correct(
     noise = sensor.noise_lsb if noise_lsb is None else noise_lsb
     # Weights 0 and 1 in floats: comparing into a bool and converting it is several times slower.
     valid = torch.sub(first.amplitude, noise, alpha=sensor.min_snr).ge_(0)
-    valid.mul_(weights_of(~raw.saturated))
+    valid.gt_(weights_of(raw.saturated))
     if raw.shots == Shots.EIGHT:
         second = decode_at(1, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
         merged_m, residual_m = unwrap_dual(
@@ -141,12 +141,15 @@ def decode_at(
     """
     start = frequency * SAMPLES_PER_FREQUENCY
     samples = raw.dcs_lsb[:, start : start + SAMPLES_PER_FREQUENCY]
-    frame = decode(samples, offset_lsb=offset_lsb)
-    if sensor.wiggle is not None:
-        frame = sensor.wiggle[frequency].corrected(frame)
-    if shift_m is not None:
-        frame = shifted(frame, shift_m, (sensor.f1_hz, sensor.f2_hz)[frequency])
-    return frame
+    frame = decode_angle(samples, offset_lsb=offset_lsb)
+    if shift_m is None:
+        shift_m = torch.zeros(1)
+    shift = shift_turns(shift_m, (sensor.f1_hz, sensor.f2_hz)[frequency]).to(samples)
+    if sensor.wiggle is None:
+        turns = torch.add(shift, frame.phase_rad, alpha=1 / TWO_PI)
+    else:
+        turns = sensor.wiggle[frequency].turns_of(frame.phase_rad).add_(shift)
+    return PhaseFrame(phase_of_turns(turns), frame.amplitude, frame.residual)
 
 
 def _merged(

@@ -7,7 +7,7 @@ import math
 import torch
 from torch import Tensor
 
-from unwrap.merge import above_zero
+from unwrap.merge import below
 from unwrap.phase import distance_m, unambiguous_range_m
 
 
@@ -45,18 +45,24 @@ def unwrap_dual(
     wrapped1_m, wrapped2_m = distance_m(phase1_rad, f1_hz), distance_m(phase2_rad, f2_hz)
     # Disagreements are held in wraps of f2, where the nearest candidate is a rounding away.
     gap = (wrapped1_m - wrapped2_m).mul_(1 / range2_m)
-    best, wraps = gap - gap.round(), torch.zeros_like(gap)
+    wrap = gap.new_tensor(range1_m / range2_m)
+    wraps, least = torch.zeros_like(gap), _from_whole(gap.clone()).abs_()
     for n in range(1, math.floor(max_range_m / range1_m) + 1):
-        shifted = gap + n * range1_m / range2_m
-        shifted.sub_(shifted.round())
-        better = above_zero(best.abs().sub_(shifted.abs()))
+        apart = _from_whole(torch.add(gap, wrap, alpha=n)).abs_()
+        better = below(apart, least)
         if (n + 1) * range1_m > max_range_m:
-            better.mul_(above_zero(max_range_m - n * range1_m - wrapped1_m))
-        best.lerp_(shifted, better)
-        wraps.lerp_(torch.full_like(wraps, n), better)
+            better.mul_(below(wrapped1_m, max_range_m - n * range1_m))
+        torch.minimum(least, apart, out=least)
+        torch.maximum(wraps, better.mul_(n), out=wraps)
+    best = _from_whole(gap.addcmul_(wraps, wrap))
     share2 = f2_hz**2 / (f1_hz**2 + f2_hz**2)
     fused_m = wrapped1_m.add_(wraps, alpha=range1_m).sub_(best, alpha=share2 * range2_m)
     return fused_m.clamp_(min=0), best.abs_().mul_(range2_m)
+
+
+def _from_whole(wraps: Tensor) -> Tensor:
+    """Signed distance from the nearest whole number, in place."""
+    return wraps.sub_(wraps.round())
 
 
 def _check(phase1: Tensor, phase2: Tensor, f1_hz: float, f2_hz: float, max_range_m: float) -> None:

@@ -7,6 +7,7 @@ by phi = 4 pi f d / c (mod 2 pi).
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -45,27 +46,35 @@ def decode(dcs: Tensor, *, offset_lsb: Tensor | None = None) -> PhaseFrame:
     ValueError
         Another number of samples, another dtype, or a NaN or infinity; the message says where.
     """
+    frame = decode_angle(dcs, offset_lsb=offset_lsb)
+    turns = torch.add(frame.phase_rad.new_ones(()), frame.phase_rad, alpha=1 / TWO_PI)
+    return replace(frame, phase_rad=phase_of_turns(turns))
+
+
+def decode_angle(dcs: Tensor, *, offset_lsb: Tensor | None = None) -> PhaseFrame:
+    """As `decode`, but with phases in [-pi, pi]."""
     _check(dcs)
     if offset_lsb is not None:
         dcs = dcs - offset_lsb.unsqueeze(-3)
     if dcs.shape[-3] == 2:
-        d0, d1 = dcs.unbind(-3)
-        return PhaseFrame(_phase(d1, d0), _hypot(d1, d0), None)
-    d0, d1, d2, d3 = dcs.unbind(-3)
-    cosine, sine = d0 - d2, d1 - d3
-    residual = torch.maximum((d0 + d2).abs_(), (d1 + d3).abs_())
-    return PhaseFrame(_phase(sine, cosine), _hypot(sine, cosine).mul_(0.5), residual)
+        return PhaseFrame(*_polar(dcs), None)
+    first, opposite = dcs.split(2, dim=-3)
+    angle, length = _polar(first - opposite)
+    return PhaseFrame(angle, length.mul_(0.5), (first + opposite).abs_().amax(dim=-3))
 
 
-def _phase(sine: Tensor, cosine: Tensor) -> Tensor:
-    """atan2 in [0, 2 pi); the clamp catches angles so little below 0 that adding 2 pi rounds up."""
-    phase = torch.atan2(sine, cosine)
-    turns = phase.mul(1 / TWO_PI).floor_()
-    return phase.add_(turns, alpha=-TWO_PI).clamp_(max=BELOW_TWO_PI)
+def _polar(quadratures: Tensor) -> tuple[Tensor, Tensor]:
+    """Angle and length of [..., 2, H, W], cosine and sine."""
+    cosine, sine = quadratures.unbind(-3)
+    return torch.atan2(sine, cosine), (cosine * cosine).addcmul_(sine, sine).sqrt_()
 
 
-def _hypot(a: Tensor, b: Tensor) -> Tensor:
-    return torch.addcmul(a * a, b, b).sqrt_()
+def phase_of_turns(turns: Tensor) -> Tensor:
+    """Phase in [0, 2 pi), in place, of turns that are not negative.
+
+    A fraction of a turn is a whole number of steps of float and never rounds up to the next one.
+    """
+    return turns.frac_().mul_(TWO_PI)
 
 
 def _check(dcs: Tensor) -> None:

@@ -175,11 +175,11 @@ class Bank:
 
     def _gather(self, name: str, indices: Tensor) -> Tensor:
         frames = [self._frame_array(name, index) for index in indices.tolist()]
-        return frames[0][None] if len(frames) == 1 else torch.stack(frames)
+        return frames[0] if len(frames) == 1 else torch.cat(frames)
 
     def _frame_array(self, name: str, index: int) -> Tensor:
         clip = int(self._clip_of_frame[index])
-        return self._map(clip)[name][index - self.clips[clip].start]
+        return self._map(clip)[name].narrow(0, index - self.clips[clip].start, 1)
 
     def _map_clip(self, clip: int) -> dict[str, Tensor]:
         folder = self.folder / self.manifest.clips[clip].folder

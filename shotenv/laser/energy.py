@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import torch
@@ -13,7 +14,7 @@ from shotenv.laser.ageing import ageing_rate
 
 Array = Any
 SECONDS_PER_HOUR = 3600.0
-NETWORK_RUNS = torch.tensor([0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0], dtype=torch.float64)
+NETWORK_RUNS = (0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
 """Predictions by number of samples: two and four do not unwrap by themselves."""
 
 
@@ -38,6 +39,18 @@ def efficiency_at(temperature_k: Array, laser: LaserConfig) -> Array:
         return laser.efficiency
     above_k = (temperature_k - ROOM_K).clip(0.0, max(laser.trip_k - ROOM_K, 0.0))
     return laser.efficiency - laser.efficiency_slope_per_k * above_k
+
+
+@lru_cache(maxsize=64)
+def chip_energies_j(readout_j: float, static_j: float, network_j: float) -> Tensor:
+    """What does not depend on the laser, by number of samples, float64 [4, 9], joules.
+
+    Of the readouts, of the imager standing by, of the network, and of all three.
+    """
+    rows = [
+        ((n + 1) * readout_j, static_j, runs * network_j) for n, runs in enumerate(NETWORK_RUNS)
+    ]
+    return torch.tensor([(*row, sum(row)) for row in rows], dtype=torch.float64).T.contiguous()
 
 
 def shot_cost(
@@ -70,20 +83,23 @@ def shot_cost(
         Multiply-accumulates of one prediction.
     """
     on_s = shots * integration_s
-    optical_j = on_s * optical_power_w
-    efficiency = efficiency_at(temperature_k, laser)
-    laser_j, driver_j = optical_j / efficiency, on_s * laser.driver_power_w
-    readout_j = (shots + 1) * laser.readout_energy_j
-    static_j = torch.full_like(on_s, laser.static_power_w * frame_period_s)
-    network_j = NETWORK_RUNS.take(shots) * (network_macs * laser.energy_per_mac_j)
-    wear = ageing_rate(optical_power_w / efficiency, temperature_k, laser)
+    electrical_w = optical_power_w / efficiency_at(temperature_k, laser)
+    optical_j, laser_j = on_s * optical_power_w, on_s * electrical_w
+    driver_j = on_s * laser.driver_power_w
+    chips = chip_energies_j(
+        laser.readout_energy_j,
+        laser.static_power_w * frame_period_s,
+        laser.energy_per_mac_j * network_macs,
+    )
+    readout_j, static_j, network_j, chips_j = chips.index_select(1, shots).unbind()
+    wear = ageing_rate(electrical_w, temperature_k, laser)
     return ShotCost(
         laser_energy_j=laser_j,
         driver_energy_j=driver_j,
         readout_energy_j=readout_j,
         static_energy_j=static_j,
         network_energy_j=network_j,
-        energy_j=laser_j + driver_j + readout_j + static_j + network_j,
+        energy_j=laser_j + driver_j + chips_j,
         optical_j=optical_j,
         heat_j=laser_j - optical_j,
         duty=on_s / frame_period_s,

@@ -23,13 +23,13 @@ def case_step(
     case_k: Array, heat_j: Array, ambient_k: Array, laser: LaserConfig, period_s: float
 ) -> Array:
     """Temperature of the case one frame later, kelvin, for a heat flow of heat / period."""
-    steady_k = ambient_k + laser.thermal_resistance_k_per_w * heat_j / period_s
+    steady_k = ambient_k + heat_j * (laser.thermal_resistance_k_per_w / period_s)
     return relaxed(case_k, steady_k, laser.thermal_time_constant_s, period_s)
 
 
 def junction_step(rise_k: Array, heat_j: Array, laser: LaserConfig, period_s: float) -> Array:
     """Rise of the junction above the case one frame later, kelvin."""
-    steady_k = laser.junction_resistance_k_per_w * heat_j / period_s
+    steady_k = heat_j * (laser.junction_resistance_k_per_w / period_s)
     return relaxed(rise_k, steady_k, laser.junction_time_constant_s, period_s)
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import reduce
 from itertools import repeat
 
 import torch
@@ -19,7 +19,7 @@ from shotenv.sensor.electrons import (
     electrons_per_radiance_second,
     tap_packets,
 )
-from shotenv.sensor.offsets import OffsetPattern, ambient_offset_lsb
+from shotenv.sensor.offsets import OffsetPattern, add_ambient_offset
 from unwrap.acquisition import Shots
 from unwrap.frames import RawFrame
 
@@ -72,6 +72,8 @@ class Electrons:
     ----------
     active_e, ambient_e : float32 [B, H, W]
         Active S and ambient B, electrons over both taps in one sample.
+    mean_e : float32 [B, H, W]
+        Of a tap's packet, the variance of reading it included: (S + B) / 2 + sigma_r^2.
     correlation : float32 [B, 8, H, W]
         As in `Exposure`.
     per_correlation_e : float32 [B, 1, 1]
@@ -80,6 +82,7 @@ class Electrons:
 
     active_e: Tensor
     ambient_e: Tensor
+    mean_e: Tensor
     correlation: Tensor
     per_correlation_e: Tensor
 
@@ -91,9 +94,9 @@ def collect(
     in_sample = electrons_per_radiance_second(sensor) * integration_s
     per_radiance = in_sample.to(exposure.ambient.dtype).view(-1, 1, 1)
     per_watt = (in_sample * laser_power_w).to(exposure.ambient.dtype).view(-1, 1, 1)
-    return Electrons(
-        exposure.active * per_watt, exposure.ambient * per_radiance, exposure.correlation, per_watt
-    )
+    active_e, ambient_e = exposure.active * per_watt, exposure.ambient * per_radiance
+    mean_e = torch.lerp(active_e, ambient_e, 0.5).add_(sensor.read_noise_e**2)
+    return Electrons(active_e, ambient_e, mean_e, exposure.correlation, per_watt)
 
 
 def acquire(
@@ -109,15 +112,13 @@ def acquire(
     Sample after sample, so that what one sample needs stays in the processor's cache; `noise`
     gives the normals [B, 2, H, W] of each.
     """
-    read_variance_e = sensor.read_noise_e**2
-    mean_e = (electrons.active_e + electrons.ambient_e).mul_(0.5).add_(read_variance_e)
-    half_modulation = mean_e.new_tensor([0.5, -0.5]).view(2, 1, 1).mul_(sensor.contrast)
-    per_correlation_e = electrons.per_correlation_e.unsqueeze(1) * half_modulation
-    full_e = sensor.full_well_e + read_variance_e
+    mean_e, per_correlation_e = electrons.mean_e, electrons.per_correlation_e
+    full_e = sensor.full_well_e + sensor.read_noise_e**2
     pattern_lsb = fixed_pattern_lsb(electrons.ambient_e, sensor, offsets)
-    batch, _, height, width = electrons.correlation.shape
+    batch, height, width = mean_e.shape
     dcs_lsb = mean_e.new_empty(batch, int(shots), height, width)
-    fullest_e = torch.zeros(())
+    taps_e = mean_e.new_empty(batch, 2, height, width)
+    fullest_e = torch.zeros_like(taps_e)
     samples = zip(
         dcs_lsb.unbind(1),
         electrons.correlation.unbind(1),
@@ -125,33 +126,32 @@ def acquire(
         strict=False,
     )
     for sample_lsb, correlation, normals in samples:
-        taps_e = tap_packets(mean_e, correlation, per_correlation_e, sensor.read_noise_e)
+        tap_packets(mean_e, correlation, per_correlation_e, sensor, out=taps_e)
         if normals is not None:
             add_noise(taps_e, normals)
         clip_to_full_well(taps_e, full_e)
+        torch.maximum(taps_e, fullest_e, out=fullest_e)
         read_out(taps_e, pattern_lsb, sensor, out=sample_lsb)
-        fullest_e = torch.maximum(taps_e, fullest_e)
+    digitise(dcs_lsb, *signed_limits_lsb(sensor.adc_bits))
     return RawFrame(dcs_lsb, _saturated(fullest_e, full_e, dcs_lsb, sensor))
 
 
 def read_out(taps_e: Tensor, pattern_lsb: Tensor, sensor: SensorConfig, *, out: Tensor) -> None:
-    """Signed words [B, H, W] of a sample from its taps [B, 2, H, W], electrons.
+    """What the converter is given of a sample's taps [B, 2, H, W], LSB [B, H, W].
 
-    The taps' difference, then gain, offset, rounding and the converter's range.
+    The taps' difference, then gain and offset.
     """
-    difference_e = torch.sub(*taps_e.unbind(1))
-    torch.add(pattern_lsb, difference_e, alpha=sensor.gain_lsb_per_e, out=out)
-    digitise(out, *signed_limits_lsb(sensor.adc_bits))
+    torch.sub(*taps_e.unbind(1), out=out)
+    torch.add(pattern_lsb, out, alpha=sensor.gain_lsb_per_e, out=out)
 
 
 def _saturated(fullest_e: Tensor, full_e: float, dcs_lsb: Tensor, sensor: SensorConfig) -> Tensor:
     """Where the fuller tap of some sample was full, or its word is at a limit of the range."""
     low, high = signed_limits_lsb(sensor.adc_bits)
-    words = dcs_lsb.unbind(1)
     # In place a comparison stays float32, which is vectorised; a bool result is not.
     beyond = torch.maximum(*fullest_e.unbind(1)).ge_(full_e)
-    beyond.add_(reduce(torch.maximum, words).ge_(high))
-    return beyond.add_(reduce(torch.minimum, words).le_(low)).bool()
+    beyond.add_(dcs_lsb.amax(dim=1).ge_(high))
+    return beyond.add_(dcs_lsb.amin(dim=1).le_(low)).bool()
 
 
 def fixed_pattern_lsb(
@@ -160,13 +160,13 @@ def fixed_pattern_lsb(
     """Offset [B, H, W] of every sample: the taps' pattern and what ambient adds; or 0."""
     if offsets is None:
         return ambient_e.new_zeros(())
-    return ambient_offset_lsb(ambient_e, sensor).add_(offsets.pattern_lsb)
+    return add_ambient_offset(offsets.pattern_lsb, ambient_e, sensor)
 
 
 def single_sample_snr(electrons: Electrons, sensor: SensorConfig) -> Tensor:
     """Noise-free signal to noise of one sample [B, H, W]: `m S / sqrt(S + B + 2 sigma_r^2)`."""
-    variance = (electrons.active_e + electrons.ambient_e).add_(2.0 * sensor.read_noise_e**2)
-    return variance.rsqrt_().mul_(electrons.active_e).mul_(sensor.contrast)
+    signal_e = electrons.mean_e.rsqrt().mul_(electrons.active_e)
+    return signal_e.mul_(math.sqrt(0.5) * sensor.contrast)
 
 
 def check_exposure(exposure: Exposure, shots: Shots) -> None:

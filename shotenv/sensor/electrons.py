@@ -34,7 +34,12 @@ def electrons_per_radiance_second(sensor: SensorConfig) -> float:
 
 
 def tap_packets(
-    mean_e: Tensor, correlation: Tensor, per_correlation_e: Tensor, read_noise_e: float
+    mean_e: Tensor,
+    correlation: Tensor,
+    per_correlation_e: Tensor,
+    sensor: SensorConfig,
+    *,
+    out: Tensor,
 ) -> Tensor:
     """Charge of both taps in one sample plus the variance of reading it, `(S + B +- m C_k) / 2`.
 
@@ -47,16 +52,15 @@ def tap_packets(
         Half of the electrons over both taps and the variance of reading, (S + B) / 2 + sigma_r^2.
     correlation : [B, H, W]
         Correlation of the light with the sample's demodulation, in any unit.
-    per_correlation_e : [B, 2, 1, 1]
-        Electrons of tap A and, negative, of tap B per unit of `correlation`.
-
-    Returns
-    -------
-    [B, 2, H, W]
-        Packets of tap A and tap B, of charges that are not negative.
+    per_correlation_e : [B, 1, 1]
+        Electrons of one sample per unit of `correlation`.
+    out : [B, 2, H, W]
+        Becomes the packets of tap A and tap B, of charges that are not negative.
     """
-    packets_e = torch.addcmul(mean_e.unsqueeze(1), correlation.unsqueeze(1), per_correlation_e)
-    return packets_e.clamp_(min=read_noise_e**2)
+    half = 0.5 * sensor.contrast
+    for tap_e, modulation in zip(out.unbind(1), (half, -half), strict=True):
+        torch.addcmul(mean_e, correlation, per_correlation_e, value=modulation, out=tap_e)
+    return out.clamp_(min=sensor.read_noise_e**2)
 
 
 def add_noise(packets_e: Tensor, normals: Tensor) -> Tensor:
@@ -65,7 +69,8 @@ def add_noise(packets_e: Tensor, normals: Tensor) -> Tensor:
     The normal distribution stands for Poisson's: one variate per packet keeps the noise stream
     in step whatever the light is.
     """
-    return packets_e.addcmul_(packets_e.sqrt(), normals)
+    # Over the reciprocal root: torch takes that one faster than the root.
+    return packets_e.addcdiv_(normals, packets_e.rsqrt())
 
 
 def clip_to_full_well(charge_e: Tensor, full_well_e: float) -> Tensor:

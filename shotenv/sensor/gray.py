@@ -64,6 +64,7 @@ def sample_noise_lsb(
     Ambient shot noise, from the gray image, and read noise: `sqrt(B + 2 sigma_r^2)`. The laser's
     own shot noise is left out; it matters only where the signal is strong anyway.
     """
-    per_word_e = integration_s / (exposure_s * gray_gain_lsb_per_e(sensor))
-    ambient_e = gray.to(torch.float32) * per_word_e.to(torch.float32)[:, None, None]
-    return ambient_e.add_(2.0 * sensor.read_noise_e**2).sqrt_().mul_(sensor.gain_lsb_per_e)
+    squared_gain = sensor.gain_lsb_per_e**2
+    per_word = integration_s / exposure_s * (squared_gain / gray_gain_lsb_per_e(sensor))
+    variance = gray.to(torch.float32).mul_(per_word.to(torch.float32).view(-1, 1, 1))
+    return variance.add_(2.0 * squared_gain * sensor.read_noise_e**2).sqrt_()
