@@ -28,7 +28,7 @@ BEYOND = 1e3
 
 @dataclass(frozen=True)
 class Smoothness:
-    """Parameters of the energy; the defaults did best on training frames of rendered roads.
+    """Parameters of the energy; the defaults did best on training frames of rendered worlds.
 
     Attributes
     ----------
