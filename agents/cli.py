@@ -198,6 +198,20 @@ def _unwrap_evaluate(parser: ArgumentParser) -> None:
     _json(parser)
 
 
+def _unwrap_correct(parser: ArgumentParser) -> None:
+    from agents.correcting import add_arguments
+
+    add_arguments(parser)
+    _json(parser)
+
+
+def _unwrap_export(parser: ArgumentParser) -> None:
+    from agents.exporting import add_arguments
+
+    add_arguments(parser)
+    _json(parser)
+
+
 def _train(parser: ArgumentParser) -> None:
     _experiment(parser)
     _out(parser, "runs/agent", "folder of the scheduler and its checkpoint")
@@ -222,6 +236,8 @@ COMMANDS = (
     Command("bank verify", "check every file of a bank against its checksum", _bank_verify),
     Command("unwrap train", "train an unwrapping network on a rendered bank", _unwrap_train),
     Command("unwrap evaluate", "measure an unwrapping network on a bank", _unwrap_evaluate),
+    Command("unwrap correct", "correct recorded samples: depth, points, picture", _unwrap_correct),
+    Command("unwrap export", "write a network as ONNX and check it against torch", _unwrap_export),
     Command("train", "train a scheduler with PPO; continues where it stopped", _train),
     Command("evaluate", "compare a trained scheduler with baselines, write a report", _evaluate),
     Command("report", "write the report of an evaluation anew", _report),

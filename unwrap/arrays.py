@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import zipfile
+import zlib
 from collections.abc import Collection
 from pathlib import Path
 from typing import IO
@@ -16,7 +17,7 @@ MAX_BYTES = 1 << 28
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 _BROKEN = (
     *(OSError, ValueError, TypeError, KeyError, EOFError, SyntaxError, RecursionError),
-    *(OverflowError, NotImplementedError, RuntimeError, zipfile.BadZipFile),
+    *(OverflowError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error),
 )
 """What reading damaged files raises."""
 

@@ -15,10 +15,13 @@ ROOMS["agents"] = {"unwrap", "shotenv", "agents"}
 ONLY_IN = {
     "mitsuba": "shotenv/render/",
     "drjit": "shotenv/render/",
-    "trimesh": "shotenv/world/",
+    "trimesh": ("shotenv/world/", "agents/"),
     "stable_baselines3": "agents/",
     "lightning": "unwrap/",
     "plotly": "agents/",
+    "PIL": ("shotenv/", "agents/"),
+    "onnx": "agents/",
+    "onnxruntime": "agents/",
 }
 
 
@@ -61,7 +64,7 @@ def test_world_knows_no_renderer_and_no_sensor():
     [
         ("shotenv", ("torch", "mitsuba", "drjit", "stable_baselines3")),
         ("agents", ("torch", "mitsuba", "stable_baselines3", "plotly")),
-        ("agents.cli", ("torch", "mitsuba", "stable_baselines3", "plotly")),
+        ("agents.cli", ("torch", "mitsuba", "stable_baselines3", "plotly", "onnx", "trimesh")),
         ("shotenv.config", ("torch", "mitsuba")),
     ],
 )
