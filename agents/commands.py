@@ -185,6 +185,22 @@ def unwrap_evaluate(arguments: Namespace) -> int:
     return DONE
 
 
+def unwrap_correct(arguments: Namespace) -> int:
+    """Correct a recording."""
+    from agents.correcting import correct_files
+
+    _write_json(arguments, correct_files(arguments))
+    return DONE
+
+
+def unwrap_export(arguments: Namespace) -> int:
+    """Write a network as ONNX."""
+    from agents.exporting import export_files
+
+    _write_json(arguments, export_files(arguments))
+    return DONE
+
+
 def _experiment(arguments: Namespace) -> DemoConfig:
     return DemoConfig(env=arguments.env, agent=arguments.agent, study=arguments.study)
 
