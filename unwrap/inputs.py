@@ -51,7 +51,7 @@ def compressed(signal_to_noise: Tensor) -> Tensor:
     """Logarithm of ratios from 0 to about 3000, scaled to [-1, 1].
 
     >>> compressed(torch.tensor([0.0, 2980.0]))
-    tensor([-1.,  1.])
+    tensor([-1.0000,  1.0000])
     """
     return signal_to_noise.log1p() * (2 / FULL_LOGARITHM) - 1.0
 
