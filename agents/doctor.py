@@ -53,7 +53,8 @@ def _is_for_main_job(requirement: str) -> bool:
     return not any(f"extra == {quote}{e}{quote}" in requirement for quote in "'\"" for e in OTHERS)
 
 
-OTHERS = ("all", "dev")
+OTHERS = ("all", "dev", "docs", "export", "verify")
+"""Extras that the main job does without."""
 
 
 def _name_of(requirement: str) -> str:
