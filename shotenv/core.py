@@ -193,13 +193,12 @@ def _look_as(
     look: Look,
 ) -> tuple[DepthScore, Tensor]:
     measured = look(problem, drive, step, shots, power_w)
-    return measured.score, keep_untold(measured.seen, features, shots)
+    return measured.score, keep_untold(measured.seen, features)
 
 
-def keep_untold(new: Tensor, old: Tensor, shots: Shots) -> Tensor:
+def keep_untold(new: Tensor, old: Tensor) -> Tensor:
     """Features [B, 6] of an acquisition; what its shots cannot tell stays as it was."""
-    told = {Shots.TWO: 4, Shots.FOUR: 5, Shots.EIGHT: 6}[shots]
-    return torch.cat((new[:, :told], old[:, told:]), dim=1)
+    return torch.cat((new, old[:, new.shape[1] :]), dim=1)
 
 
 def derated_w(problem: Problem, state: State) -> Tensor | None:
@@ -228,10 +227,11 @@ def _remember(
     problem: Problem, state: State, shots: Tensor, terms: dict[str, Tensor], features: Tensor
 ) -> Seen:
     share, seen = min(1.0, problem.frame_period_s / RECENT_S), state.seen
+    fewer = FEWER.index_select(0, shots)
     return Seen(
         features=features,
         shots=shots,
-        since=(seen.since + 1).mul_(FEWER.index_select(0, shots)),
+        since=torch.addcmul(fewer, fewer, seen.since),
         used=seen.used.lerp(torch.stack((terms["duty"], terms["power"]), dim=1), share),
     )
 
@@ -281,7 +281,7 @@ class Outcomes:
     score : DepthScore
         Fields [T, 3].
     features : float32 [T, 3, 6]
-        What the sensor would tell.
+        What the sensor would tell; 0 where the shots cannot.
     tripped_terms : dict of float64
         Terms of a frame without laser, the same in every frame.
     """
@@ -326,7 +326,9 @@ def _measure_all(problem: Problem, drive: Drive, step: Tensor) -> Measured:
     noise = list(
         islice(noise_of(drive, step, problem.bank.height, problem.bank.width), Shots.EIGHT)
     )
-    return concatenate([measure(problem, drive, step, shots, noise=noise) for shots in Shots])
+    measured = [measure(problem, drive, step, shots, noise=noise) for shots in Shots]
+    untold = torch.zeros(1, len(SEEN_FEATURES))
+    return concatenate([Measured(m.score, keep_untold(m.seen, untold)) for m in measured])
 
 
 def _stack(scores: Sequence[DepthScore], frames: int) -> DepthScore:

@@ -9,8 +9,9 @@ import torch
 from torch import Tensor
 
 from shotenv.drive import Drive
+from shotenv.observe import SEEN_FEATURES
 from shotenv.problem import Problem
-from shotenv.reward import DepthScore, frame_sums, score_depth
+from shotenv.reward import DepthScore, frame_sums, score_maps, score_of
 from shotenv.sensor import (
     Electrons,
     acquire,
@@ -20,9 +21,8 @@ from shotenv.sensor import (
     single_sample_snr,
 )
 from unwrap.acquisition import Shots
-from unwrap.correction import correct
+from unwrap.correction import correct_and_weigh
 from unwrap.frames import DepthFrame, RawFrame
-from unwrap.merge import weights_of
 from unwrap.phase import unambiguous_range_m
 
 
@@ -36,12 +36,13 @@ class Acquisition:
         Samples and corrected depth.
     predicted_m, noise_lsb, truth_m : float32 [B, H, W]
         The network's coarse distance, the sensor's own estimate of a sample's noise, the truth.
-    scored : float32 [B, H, W]
-        1 where the pixel counts, else 0.
+    valid, scored : float32 [B, H, W]
+        1 where the depth is valid, and where the pixel counts, else 0.
     """
 
     raw: RawFrame
     depth: DepthFrame
+    valid: Tensor
     predicted_m: Tensor
     noise_lsb: Tensor
     truth_m: Tensor
@@ -56,9 +57,9 @@ class Measured:
     ----------
     score : DepthScore
         Against the truth; pays the reward.
-    seen : float32 [B, 6]
-        What the sensor itself can tell, see `observe.SEEN_FEATURES`; the last two columns are
-        meaningful only with enough shots.
+    seen : float32 [B, 4, 5 or 6]
+        What the sensor itself can tell: the first of `observe.SEEN_FEATURES`, the fifth with 4 or
+        8 shots, the sixth with 8.
     """
 
     score: DepthScore
@@ -99,7 +100,7 @@ def acquire_depth(
     noise_lsb = sample_noise_lsb(
         bank.gray(frames), problem.gray_exposure_s.take(frames), drive.integration_s, sensor
     )
-    depth = correct(
+    depth, valid = correct_and_weigh(
         raw,
         predicted_m,
         problem.description,
@@ -110,7 +111,7 @@ def acquire_depth(
         shift_m=drive.drift_m,
     )
     scored = scored_pixels(undiminished, exposure.distance_m, problem)
-    return Acquisition(raw, depth, predicted_m, noise_lsb, exposure.distance_m, scored)
+    return Acquisition(raw, depth, valid, predicted_m, noise_lsb, exposure.distance_m, scored)
 
 
 def scored_pixels(electrons: Electrons, truth_m: Tensor, problem: Problem) -> Tensor:
@@ -132,39 +133,38 @@ def measure(
 ) -> Measured:
     """Acquire, correct and score the frames at `step` [B] of `drive`; see `acquire_depth`."""
     made = acquire_depth(problem, drive, step, shots, power_w, noise=noise)
-    valid = weights_of(made.depth.valid)
-    score = score_depth(
+    scored = score_maps(
         made.depth.distance_m,
-        valid,
+        made.valid,
         made.truth_m,
         made.scored,
         error_scale_m=problem.config.reward.error_scale_m,
         unambiguous_m=unambiguous_range_m(problem.config.sensor.f1_hz),
-        range_m=problem.config.sensor.max_range_m,
     )
-    return Measured(score, seen_by_sensor(made, valid, shots))
+    sums = frame_sums(*scored, *seen_maps(made, shots))
+    count, pixels = len(scored), problem.bank.height * problem.bank.width
+    score = score_of(sums[:count], problem.config.sensor.max_range_m)
+    return Measured(score, seen_of(sums[count:], pixels))
 
 
-def seen_by_sensor(made: Acquisition, valid: Tensor, shots: Shots) -> Tensor:
-    """What the sensor can tell of an acquisition without the truth, float32 [B, 6].
-
-    `valid` [B, H, W] is that of the depth, as 0 and 1.
-    """
+def seen_maps(made: Acquisition, shots: Shots) -> list[Tensor]:
+    """What the sensor can tell of each pixel without the truth, 4, 5 or 6 maps [B, H, W]."""
     amplitude, residual = made.depth.amplitude, made.depth.residual
-    pixels = amplitude.shape[1] * amplitude.shape[2]
-    saturated = weights_of(made.raw.saturated)
-    maps = [amplitude, _above_noise(amplitude, made.noise_lsb), valid, saturated]
+    maps = [amplitude, _above_noise(amplitude, made.noise_lsb), made.valid, made.raw.saturation]
     if residual is not None:
         maps.append(_above_noise(residual, made.noise_lsb))
     if shots == Shots.EIGHT:
         apart_m = (made.depth.distance_m - made.predicted_m).abs_()
-        maps.append((apart_m / (apart_m + 1.0)).mul_(valid))
-    sums = frame_sums(*maps)
-    seen = torch.zeros(6, sums.shape[1], dtype=sums.dtype)
-    torch.div(sums, pixels, out=seen[: len(sums)])
+        maps.append((apart_m / (apart_m + 1.0)).mul_(made.valid))
+    return maps
+
+
+def seen_of(sums: Tensor, pixels: int) -> Tensor:
+    """Features float32 [B, 4, 5 or 6] of the sums of `seen_maps` over frames of `pixels` pixels."""
+    seen = sums / pixels
     seen[0].log1p_().div_(6.9)
-    if shots == Shots.EIGHT:
-        seen[5] = sums[5] / sums[2].clamp(min=1)
+    if len(sums) == len(SEEN_FEATURES):
+        torch.div(sums[5], sums[2].clamp(min=1), out=seen[5])
     return seen.T.to(torch.float32)
 
 

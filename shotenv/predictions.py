@@ -47,7 +47,8 @@ class KeptPredictions:
 
 
 def _rows(maps: Tensor, frames: Tensor) -> Tensor:
-    return maps.index_select(0, frames).to(torch.float32)
+    rows = [maps.narrow(0, frame, 1) for frame in frames.tolist()]
+    return (rows[0] if len(rows) == 1 else torch.cat(rows)).to(torch.float32)
 
 
 def keep_predictions(bank: Bank, unwrapper: Unwrapper) -> KeptPredictions:

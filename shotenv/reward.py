@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import torch
 from torch import Tensor
@@ -73,26 +74,56 @@ def score_depth(
 
     `valid` and `scored` are bool, or float with 0 and 1 (float masks are several times faster).
     """
-    counted = scored.to(distance_m.dtype)
-    good = valid.to(distance_m.dtype) * counted
+    counted, good = scored.to(distance_m.dtype), valid.to(distance_m.dtype)
+    maps = score_maps(
+        distance_m,
+        good,
+        truth_m,
+        counted,
+        error_scale_m=error_scale_m,
+        unambiguous_m=unambiguous_m,
+    )
+    return score_of(frame_sums(*maps), range_m)
+
+
+def score_maps(
+    distance_m: Tensor,
+    valid: Tensor,
+    truth_m: Tensor,
+    scored: Tensor,
+    *,
+    error_scale_m: float,
+    unambiguous_m: float,
+) -> tuple[Tensor, ...]:
+    """What a score sums over each frame, six maps [B, H, W]; `valid` and `scored` are 0 and 1.
+
+    In the order of `DepthScore` numerators, in metres where they are errors; and `scored`.
+    """
+    good = valid * scored
     error_m = (distance_m - truth_m).abs_()
     error_m = error_m.nan_to_num_(FARTHEST_ERROR_M, FARTHEST_ERROR_M)
     good_error_m = error_m * good
-    sums = frame_sums(
-        (error_m * counted).div_(error_m + error_scale_m),
-        below(error_m, 0.5 * unambiguous_m).mul_(good),
-        good,
-        counted,
-        good_error_m,
-        error_m.mul_(good_error_m),
-    )
-    _, _, good_count, count, *_ = sums.unbind()
-    shares, means_m = sums[:3] / count.clamp(min=1), sums[4:] / good_count.clamp(min=1)
-    shares[1:].masked_fill_(count == 0, 1.0)
-    means_m[1].sqrt_()
-    means_m.masked_fill_(good_count == 0, range_m)
-    (error, right, valid_share), (absolute_m, squared_m) = shares.unbind(), means_m.unbind()
-    return DepthScore(error, absolute_m, squared_m, right, valid_share)
+    bounded = (error_m * scored).div_(error_m + error_scale_m)
+    right = below(error_m, 0.5 * unambiguous_m).mul_(good)
+    return bounded, good_error_m, error_m.mul_(good_error_m), right, good, scored
+
+
+DIVISORS = torch.tensor([5, 4, 4, 5, 5])
+"""Which of the six sums each of the others is divided by."""
+
+
+def score_of(sums: Tensor, range_m: float) -> DepthScore:
+    """Score of the sums [6, B] of `score_maps`."""
+    counts = sums.index_select(0, DIVISORS)
+    means = sums[:5] / counts.clamp(min=1)
+    means[2].sqrt_()
+    return DepthScore(*torch.where(counts == 0, _nothing_counted(range_m), means).unbind())
+
+
+@lru_cache(maxsize=16)
+def _nothing_counted(range_m: float) -> Tensor:
+    """Score, float64 [5, 1], where there is no pixel to count."""
+    return torch.tensor([[0.0], [range_m], [range_m], [1.0], [1.0]], dtype=torch.float64)
 
 
 def no_depth(batch: int, range_m: float) -> DepthScore:

@@ -48,10 +48,10 @@ class WiggleTable:
         """The table that removes `share` of what this one does."""
         return WiggleTable(tuple(share * error for error in self.error_rad))
 
-    @property
-    def _first(self) -> int:
+    @cached_property
+    def _first(self) -> Tensor:
         """Bins from the first line, at a phase of -pi or just below it, to phase 0."""
-        return (len(self.error_rad) + 1) // 2
+        return torch.tensor((len(self.error_rad) + 1) // 2)
 
     @cached_property
     def _lines(self) -> Tensor:
@@ -59,7 +59,7 @@ class WiggleTable:
 
         From -pi to 2 pi and a bin beyond, which is that of phases that round up.
         """
-        count, first = len(self.error_rad), self._first
+        count, first = len(self.error_rad), int(self._first)
         place = torch.arange(first + count + 2, dtype=torch.float64)
         errors = torch.tensor(self.error_rad, dtype=torch.float64).roll(first)
         errors = errors[place.long() % count] / TWO_PI
@@ -69,9 +69,8 @@ class WiggleTable:
 
     def turns_of(self, phase_rad: Tensor) -> Tensor:
         """Phases without their error in turns, of the shape of decoded ones in [-pi, 2 pi)."""
-        lines = self._lines.to(phase_rad)
-        start = lines.new_tensor(self._first)
-        place = torch.add(start, phase_rad, alpha=len(self.error_rad) / TWO_PI).flatten()
+        first, lines = self._first.to(phase_rad), self._lines.to(phase_rad)
+        place = torch.add(first, phase_rad, alpha=len(self.error_rad) / TWO_PI).flatten()
         constant, slope = lines.index_select(1, place.to(torch.int32)).unbind(0)
         return torch.addcmul(constant, slope, place).view(phase_rad.shape)
 

@@ -17,7 +17,7 @@ from unwrap.acquisition import SAMPLES_PER_FREQUENCY, Shots
 from unwrap.calibration import WiggleTable, shift_turns
 from unwrap.dual import unwrap_dual
 from unwrap.frames import DepthFrame, PhaseFrame, RawFrame
-from unwrap.merge import merge_nearest, merge_regression, weights_of
+from unwrap.merge import merge_nearest, merge_regression
 from unwrap.phase import TWO_PI, decode_angle, distance_m, phase_of_turns, unambiguous_range_m
 
 Merge = Literal["nearest", "floor"]
@@ -97,13 +97,35 @@ def correct(
         Two or four samples without a prediction, an unknown merge, or samples that `decode`
         refuses.
     """
+    return correct_and_weigh(
+        raw,
+        predicted_m,
+        sensor,
+        merge=merge,
+        offset_lsb=offset_lsb,
+        noise_lsb=noise_lsb,
+        shift_m=shift_m,
+    )[0]
+
+
+def correct_and_weigh(
+    raw: RawFrame,
+    predicted_m: Tensor | None,
+    sensor: SensorDescription,
+    *,
+    merge: Merge,
+    offset_lsb: Tensor | None,
+    noise_lsb: Tensor | float | None,
+    shift_m: Tensor | None,
+) -> tuple[DepthFrame, Tensor]:
+    """What `correct` gives, and the weight of each pixel, float32 [B, H, W]: 1 valid, 0 not."""
     if merge not in MERGES:
         raise ValueError(f"merge is {merge!r}; expected one of {', '.join(MERGES)}")
     first = decode_at(0, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
     noise = sensor.noise_lsb if noise_lsb is None else noise_lsb
     # Weights 0 and 1 in floats: comparing into a bool and converting it is several times slower.
     valid = torch.sub(first.amplitude, noise, alpha=sensor.min_snr).ge_(0)
-    valid.gt_(weights_of(raw.saturated))
+    valid.gt_(raw.saturation)
     if raw.shots == Shots.EIGHT:
         second = decode_at(1, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
         merged_m, residual_m = unwrap_dual(
@@ -123,7 +145,7 @@ def correct(
         raise ValueError(f"predicted_m is None; {int(raw.shots)} samples cannot be unwrapped alone")
     else:
         merged_m = _merged(first, predicted_m, sensor, merge)
-    return _frame(merged_m, valid, first, predicted_m, sensor)
+    return _frame(merged_m, valid, first, predicted_m, sensor), valid
 
 
 def decode_at(

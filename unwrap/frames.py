@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from torch import Tensor
 
 from unwrap.acquisition import Shots
+from unwrap.merge import weights_of
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,11 @@ class RawFrame:
     def shots(self) -> Shots:
         """Number of samples."""
         return Shots(self.dcs_lsb.shape[-3])
+
+    @cached_property
+    def saturation(self) -> Tensor:
+        """1 where `saturated`, else 0, float32 [B, H, W]."""
+        return weights_of(self.saturated)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -167,14 +168,15 @@ class Bank:
 
     def exposure(self, indices: Tensor) -> Exposure:
         """Noise-free light of the frames `indices` [B]."""
-        return Exposure(**{name: self._gather(name, indices) for name in ARRAYS if name != "gray"})
+        rows = indices.tolist()
+        return Exposure(**{name: self._gather(name, rows) for name in ARRAYS if name != "gray"})
 
     def gray(self, indices: Tensor) -> Tensor:
         """Gray images uint16 [B, H, W] of the frames `indices` [B]."""
-        return self._gather("gray", indices)
+        return self._gather("gray", indices.tolist())
 
-    def _gather(self, name: str, indices: Tensor) -> Tensor:
-        frames = [self._frame_array(name, index) for index in indices.tolist()]
+    def _gather(self, name: str, indices: Sequence[int]) -> Tensor:
+        frames = [self._frame_array(name, index) for index in indices]
         return frames[0] if len(frames) == 1 else torch.cat(frames)
 
     def _frame_array(self, name: str, index: int) -> Tensor:

@@ -17,6 +17,7 @@ from shotenv.sensor.electrons import (
     add_noise,
     clip_to_full_well,
     electrons_per_radiance_second,
+    keep_positive,
     tap_packets,
 )
 from shotenv.sensor.offsets import OffsetPattern, add_ambient_offset
@@ -113,11 +114,13 @@ def acquire(
     gives the normals [B, 2, H, W] of each.
     """
     mean_e, per_correlation_e = electrons.mean_e, electrons.per_correlation_e
-    full_e = sensor.full_well_e + sensor.read_noise_e**2
+    read_variance_e = sensor.read_noise_e**2
+    full_e = sensor.full_well_e + read_variance_e
     pattern_lsb = fixed_pattern_lsb(electrons.ambient_e, sensor, offsets)
     batch, height, width = mean_e.shape
     dcs_lsb = mean_e.new_empty(batch, int(shots), height, width)
     taps_e = mean_e.new_empty(batch, 2, height, width)
+    tap_a_e, tap_b_e = taps_e.unbind(1)
     fullest_e = torch.zeros_like(taps_e)
     samples = zip(
         dcs_lsb.unbind(1),
@@ -126,22 +129,25 @@ def acquire(
         strict=False,
     )
     for sample_lsb, correlation, normals in samples:
-        tap_packets(mean_e, correlation, per_correlation_e, sensor, out=taps_e)
+        tap_packets(mean_e, correlation, per_correlation_e, sensor.contrast, out=(tap_a_e, tap_b_e))
+        keep_positive(taps_e, read_variance_e)
         if normals is not None:
             add_noise(taps_e, normals)
         clip_to_full_well(taps_e, full_e)
         torch.maximum(taps_e, fullest_e, out=fullest_e)
-        read_out(taps_e, pattern_lsb, sensor, out=sample_lsb)
+        read_out(tap_a_e, tap_b_e, pattern_lsb, sensor, out=sample_lsb)
     digitise(dcs_lsb, *signed_limits_lsb(sensor.adc_bits))
     return RawFrame(dcs_lsb, _saturated(fullest_e, full_e, dcs_lsb, sensor))
 
 
-def read_out(taps_e: Tensor, pattern_lsb: Tensor, sensor: SensorConfig, *, out: Tensor) -> None:
-    """What the converter is given of a sample's taps [B, 2, H, W], LSB [B, H, W].
+def read_out(
+    tap_a_e: Tensor, tap_b_e: Tensor, pattern_lsb: Tensor, sensor: SensorConfig, *, out: Tensor
+) -> None:
+    """What the converter is given of a sample's taps [B, H, W], LSB [B, H, W].
 
     The taps' difference, then gain and offset.
     """
-    torch.sub(*taps_e.unbind(1), out=out)
+    torch.sub(tap_a_e, tap_b_e, out=out)
     torch.add(pattern_lsb, out, alpha=sensor.gain_lsb_per_e, out=out)
 
 
@@ -149,7 +155,7 @@ def _saturated(fullest_e: Tensor, full_e: float, dcs_lsb: Tensor, sensor: Sensor
     """Where the fuller tap of some sample was full, or its word is at a limit of the range."""
     low, high = signed_limits_lsb(sensor.adc_bits)
     # In place a comparison stays float32, which is vectorised; a bool result is not.
-    beyond = torch.maximum(*fullest_e.unbind(1)).ge_(full_e)
+    beyond = fullest_e.amax(dim=1).ge_(full_e)
     beyond.add_(dcs_lsb.amax(dim=1).ge_(high))
     return beyond.add_(dcs_lsb.amin(dim=1).le_(low)).bool()
 

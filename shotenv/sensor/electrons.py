@@ -37,10 +37,10 @@ def tap_packets(
     mean_e: Tensor,
     correlation: Tensor,
     per_correlation_e: Tensor,
-    sensor: SensorConfig,
+    contrast: float,
     *,
-    out: Tensor,
-) -> Tensor:
+    out: tuple[Tensor, Tensor],
+) -> None:
     """Charge of both taps in one sample plus the variance of reading it, `(S + B +- m C_k) / 2`.
 
     With the read noise's variance added a packet is its own variance (Poisson's equals the mean),
@@ -54,13 +54,18 @@ def tap_packets(
         Correlation of the light with the sample's demodulation, in any unit.
     per_correlation_e : [B, 1, 1]
         Electrons of one sample per unit of `correlation`.
-    out : [B, 2, H, W]
-        Becomes the packets of tap A and tap B, of charges that are not negative.
+    contrast : float
+        Demodulation contrast m.
+    out : two of [B, H, W]
+        Become the packets of tap A and of tap B.
     """
-    half = 0.5 * sensor.contrast
-    for tap_e, modulation in zip(out.unbind(1), (half, -half), strict=True):
-        torch.addcmul(mean_e, correlation, per_correlation_e, value=modulation, out=tap_e)
-    return out.clamp_(min=sensor.read_noise_e**2)
+    for tap_e, half in zip(out, (0.5, -0.5), strict=True):
+        torch.addcmul(mean_e, correlation, per_correlation_e, value=half * contrast, out=tap_e)
+
+
+def keep_positive(packets_e: Tensor, read_variance_e: float) -> Tensor:
+    """Packets in place, of charges that are not negative: a sample may differ from the mean."""
+    return packets_e.clamp_(min=read_variance_e)
 
 
 def add_noise(packets_e: Tensor, normals: Tensor) -> Tensor:
