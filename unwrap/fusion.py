@@ -1,15 +1,17 @@
 """TofFusionNet: gray image, phase, amplitude and memory to the wrap of every pixel.
 
-The body (`unwrap.nets.Autoencoder`) sees the scene at half resolution; a small last stage sees its
-maps beside the features at full resolution, so that wraps can change from pixel to pixel. What
-comes out is a curve over distance for each pixel: scores at knots, linear in between, the logarithm
-of a density. The pixel's own wrap candidates (wrapped distance plus whole unambiguous ranges) are
-looked up on it, so that a decision near a wrap boundary follows the phase as measured, noise and
-all; where a pixel has no usable signal the curve's mean is its distance.
+What comes out is a curve over distance for each pixel: scores at knots, linear in between, the
+logarithm of a density. The pixel's own wrap candidates (wrapped distance plus whole unambiguous
+ranges) are looked up on it, so that a decision near a wrap boundary follows the phase as measured,
+noise and all; where a pixel has no usable signal the curve's mean is its distance.
+
+The body (`unwrap.nets.Autoencoder`) sees the scene at half resolution. What it finds is judged
+pixel by pixel, beside the pixel's own phase and amplitude, by a perceptron with one hidden layer.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import ClassVar, Self
 
@@ -19,46 +21,59 @@ from torch.nn import functional
 
 from unwrap.acquisition import Shots
 from unwrap.correction import SensorDescription
-from unwrap.inputs import first_phase, noise_of, phase_maps, samples_of, wrapped_distance_m
+from unwrap.inputs import first_phase, noise_of, phase_maps, samples_of
 from unwrap.losses import LossWeights
-from unwrap.merge import weights_of
+from unwrap.merge import nearest_wraps, weights_of
 from unwrap.nets import IGNORED, Autoencoder, convolution, describe, pad
-from unwrap.network import Needs, Prediction, Settings
+from unwrap.network import Needs, Prediction, Settings, autocast
+from unwrap.phase import distance_m
+from unwrap.reliability import fit_temperature
 from unwrap.sensed import Memory, Sensed, Truth
 
-FEATURES = 10
-"""Maps that the network sees: three of gray, four of phase, the samples, two of memory."""
+FEATURES = 9
+"""Maps that the network sees: three of gray, four of phase, two of memory."""
 HIDDEN = 16
-"""Maps of the body that the last stage sees, and its width."""
+"""Maps that the body gives to each pixel, and the hidden layer's width."""
 KNOTS_PER_WRAP = 2
+CORRECTION = 0.25
+"""Largest correction of a measured distance, in unambiguous ranges: never into another wrap."""
 COARSE_WEIGHT = 0.2
 """Weight of the loss of the whole curve beside that of the wrap candidates."""
+CORRECTION_WEIGHT = 0.5
+"""Weight of the mean error in metres at the right wrap, as above."""
 FORGOTTEN = 0.5
 """Share of the training frames whose memory is taken away."""
 DOUBTED = 0.1
 """Share of the blocks of remembered depth erased in training; as many are moved each way."""
 BLOCKS = (6, 8)
 """Blocks down and across an image."""
+CALIBRATION_PIXELS = 200_000
+"""At most so many pixels for each number of samples."""
 
 
 class TofFusionNet(Autoencoder):
-    """Scores of distance at the knots of each pixel, from all that the sensor delivers.
+    """Scores at the knots of distance and a correction, from all that the sensor delivers.
+
+    How many samples were taken is not among the features: a batch has one number of samples, and
+    batch normalisation would take the constant away in training and leave it in use.
 
     Parameters
     ----------
     settings : Settings
-        `width`, `classes` and `f1_hz` matter: knots lie `KNOTS_PER_WRAP` to an unambiguous range
-        from 0 to the end of the last class.
+        Knots lie `KNOTS_PER_WRAP` to an unambiguous range of `f1_hz`, from 0 to the end of the last
+        of `classes` wraps.
     """
 
     needs: ClassVar[Needs] = "samples"
     temperature: Tensor
-    """Of the softmax over the candidates, for 2 and for 4 samples; see `calibrate`."""
+    """Of the softmax over the candidates, with 2 and with more samples; see `calibrate`."""
 
     def __init__(self, settings: Settings):
         super().__init__(settings, FEATURES, HIDDEN)
-        self.sharpen = convolution(HIDDEN + FEATURES, HIDDEN)
-        self.score = nn.Conv2d(HIDDEN, KNOTS_PER_WRAP * settings.classes + 1, 1)
+        self.judge = nn.Sequential(
+            convolution(HIDDEN + FEATURES, HIDDEN, kernel=1),
+            nn.Conv2d(HIDDEN, KNOTS_PER_WRAP * settings.classes + 2, 1),
+        )
         self.register_buffer("temperature", torch.ones(2))
 
     @classmethod
@@ -67,37 +82,36 @@ class TofFusionNet(Autoencoder):
         return cls(settings)
 
     def forward(self, features: Tensor) -> Tensor:
-        """features [B, FEATURES, H, W] -> scores [B, knots, H, W], for any H and W."""
+        """features [B, FEATURES, H, W] -> [B, knots + 1, H, W], for any H and W.
+
+        The last map is the correction, in units of the largest, before it is bounded.
+        """
         height, width = features.shape[-2:]
         padded = pad(features)
-        sharp = self.sharpen(torch.cat((super().forward(padded), padded), 1))
-        return self.score(sharp).float()[..., :height, :width]
+        output = self.judge(torch.cat((super().forward(padded), padded), 1))
+        return output.float()[..., :height, :width]
 
     def features(self, sensed: Sensed, sensor: SensorDescription) -> Tensor:
-        """Gray image, phase, amplitude, saturation, number of samples, memory.
+        """Gray image, phase, amplitude, saturation, memory.
 
         In training memory is partly withheld and spoilt (`doubted`), so that the network does not
-        come to rely on it; what happens is drawn from torch's global generator, which training
-        seeds at each step.
+        come to rely on it. What happens is drawn from torch's global generator, which training is
+        to seed at each step.
 
         Raises
         ------
         ValueError
             There are no samples.
         """
-        gray = describe(sensed.gray.unsqueeze(1))
-        phase = phase_maps(sensed, sensor)
-        four = torch.full_like(gray[:, :1], float(samples_of(sensed).shots >= Shots.FOUR))
         memory = sensed.memory
-        if memory is None:
-            remembered = torch.zeros_like(gray[:, :2])
-        else:
-            if self.training:
-                memory = doubted(memory, self.settings.unambiguous_m)
-            distance = memory.distance_m / self.settings.range_m
-            remembered = torch.stack((distance * memory.known, memory.known), 1)
-        features = torch.cat((gray, phase, four, remembered), 1)
-        return features.contiguous(memory_format=torch.channels_last)
+        if memory is not None and self.training:
+            memory = doubted(memory, self.settings.unambiguous_m)
+        maps = (
+            describe(sensed.gray.unsqueeze(1)),
+            phase_maps(sensed, sensor),
+            memory_maps(memory, sensed.gray, self.settings.range_m),
+        )
+        return torch.cat(maps, 1).contiguous(memory_format=torch.channels_last)
 
     def loss(
         self,
@@ -107,49 +121,101 @@ class TofFusionNet(Autoencoder):
         sensor: SensorDescription,
         weights: LossWeights,
     ) -> Tensor:
-        """Cross entropy of the wrap candidates, and of the curve's knots at `COARSE_WEIGHT`.
+        """Cross entropy of the wrap candidates, that of the knots, and the corrected mean error.
 
-        The first counts pixels with a usable signal, the second all of known truth.
+        The first and last count pixels with a usable signal, the second all of known truth, at
+        `COARSE_WEIGHT`. `weights` are those of other networks.
         """
-        wrapped_m = wrapped_distance_m(sensed, sensor)
-        candidates = candidate_scores(output, wrapped_m, self.settings.unambiguous_m)
-        target = own_wraps(truth.distance_m, wrapped_m, self.settings)
-        counted = truth.known & usable(sensed, sensor)
+        unambiguous_m, (scores, correction_m) = self.settings.unambiguous_m, self.parts(output)
+        wrapped_m, signal = measured(sensed, sensor)
+        wraps = own_wraps(truth.distance_m, wrapped_m, self.settings)
+        counted = truth.known & signal
+        candidates = candidate_scores(scores, wrapped_m, unambiguous_m)
         wrap = functional.cross_entropy(
-            candidates, target.masked_fill(~counted, IGNORED), reduction="sum"
-        )
-        coarse = knot_entropy(output, truth.distance_m, self.settings.unambiguous_m)
-        return wrap / counted.sum().clamp(min=1) + COARSE_WEIGHT * mean_over(coarse, truth.known)
+            candidates, wraps.masked_fill(~counted, IGNORED), reduction="sum"
+        ) / counted.sum().clamp(min=1)
+        coarse = mean_over(knot_entropy(scores, truth.distance_m, unambiguous_m), truth.known)
+        error_m = wrapped_m + wraps * unambiguous_m + correction_m - truth.distance_m
+        # Truth that is clamped is not the pixel's own.
+        exact = counted & (truth.distance_m < self.settings.range_m)
+        return wrap + COARSE_WEIGHT * coarse + CORRECTION_WEIGHT * mean_over(error_m.abs(), exact)
+
+    def parts(self, output: Tensor) -> tuple[Tensor, Tensor]:
+        """Scores [B, knots, H, W] and correction [B, H, W], metres, from what `forward` gave."""
+        largest_m = CORRECTION * self.settings.unambiguous_m
+        return output[:, :-1], largest_m * torch.tanh(output[:, -1])
 
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
-        """The likeliest candidate, and the probability that its wrap is right.
+        """The likeliest candidate, corrected, and the probability that its wrap is right.
 
         Pixels without a usable signal have the mean of their curve, and as confidence the
         probability of the candidate that lies there.
         """
-        unambiguous_m = self.settings.unambiguous_m
-        signal = usable(sensed, sensor)
-        coarse_m = mean_distance_m(output, unambiguous_m)
-        measured_m = wrapped_distance_m(sensed, sensor)
-        wrapped_m = torch.where(signal, measured_m, coarse_m.remainder(unambiguous_m))
-        probability = self.probability(output, wrapped_m, samples_of(sensed).shots)
-        below = (coarse_m / unambiguous_m).long().clamp(0, self.settings.classes - 1)
-        wraps = torch.where(signal, probability.argmax(1), below)
+        unambiguous_m, (scores, correction_m) = self.settings.unambiguous_m, self.parts(output)
+        wrapped_m, signal = measured(sensed, sensor)
+        coarse_m = mean_distance_m(scores, unambiguous_m)
+        place_m = torch.where(signal, wrapped_m, coarse_m.remainder(unambiguous_m))
+        logits = candidate_scores(scores, place_m, unambiguous_m)
+        probability = (logits / self.temperature[_place_of(sensed)]).softmax(1)
+        wraps = torch.where(signal, probability.argmax(1), (coarse_m / unambiguous_m).long())
         confidence = probability.gather(1, wraps.unsqueeze(1)).squeeze(1)
-        return Prediction(wrapped_m + wraps * unambiguous_m, confidence)
+        corrected_m = wrapped_m + wraps * unambiguous_m + correction_m
+        return Prediction(torch.where(signal, corrected_m.clamp(min=0), coarse_m), confidence)
 
-    def probability(self, scores: Tensor, wrapped_m: Tensor, shots: int) -> Tensor:
-        """Calibrated probability [B, classes, H, W] of each wrap candidate."""
-        candidates = candidate_scores(scores, wrapped_m, self.settings.unambiguous_m)
-        return (candidates / self.temperature[int(shots >= Shots.FOUR)]).softmax(1)
+    @torch.no_grad()
+    def calibrate(self, batches: Iterable[tuple[Sensed, Truth]], sensor: SensorDescription) -> None:
+        """Fit `temperature` on frames that the network was not trained on.
+
+        It is the one that gives the right wraps the greatest likelihood, for 2 samples and for
+        more by themselves; where there are no frames of a kind it stays as it is. Pixels without a
+        usable signal and those of truth beyond the range are left out, and of the others every
+        batch gives at most `CALIBRATION_PIXELS`, evenly spaced.
+        """
+        found: tuple[list, list] = ([], [])
+        self.eval()
+        for sensed, truth in batches:
+            found[_place_of(sensed)].append(self._labelled(sensed, truth, sensor))
+        for place, pairs in enumerate(found):
+            if pairs:
+                logits, wraps = (torch.cat(part) for part in zip(*pairs, strict=True))
+                if len(logits):
+                    self.temperature[place] = fit_temperature(logits, wraps)
+
+    def _labelled(
+        self, sensed: Sensed, truth: Truth, sensor: SensorDescription
+    ) -> tuple[Tensor, Tensor]:
+        """Candidate scores [N, classes] and right wraps [N] of the pixels that tell something."""
+        with autocast(sensed.gray.device):
+            output = self(self.features(sensed, sensor))
+        wrapped_m, signal = measured(sensed, sensor)
+        logits = candidate_scores(self.parts(output)[0], wrapped_m, self.settings.unambiguous_m)
+        wraps = own_wraps(truth.distance_m, wrapped_m, self.settings)
+        told = signal & truth.known & (truth.distance_m < self.settings.range_m)
+        step = max(1, int(told.sum()) // CALIBRATION_PIXELS)
+        return logits.movedim(1, -1)[told][::step], wraps[told][::step]
+
+
+def _place_of(sensed: Sensed) -> int:
+    """Which temperature is for these frames."""
+    return int(samples_of(sensed).shots > Shots.TWO)
+
+
+def measured(sensed: Sensed, sensor: SensorDescription) -> tuple[Tensor, Tensor]:
+    """Wrapped distance [B, H, W] in metres, and where it is usable, bool.
+
+    Usable is what has signal enough and is not saturated, as in `unwrap.correction.correct`.
+    """
+    frame = first_phase(sensed, sensor)
+    strong = frame.amplitude >= noise_of(sensed, sensor) * sensor.min_snr
+    return distance_m(frame.phase_rad, sensor.f1_hz), strong & ~samples_of(sensed).saturated
 
 
 def candidate_scores(scores: Tensor, wrapped_m: Tensor, unambiguous_m: float) -> Tensor:
     """Curves [B, knots, H, W] looked up at the wrap candidates of `wrapped_m` [B, H, W].
 
     Returns [B, classes, H, W]: class n stands for the distance wrapped_m + n unambiguous_m. All
-    candidates of a pixel lie equally far behind their last knot, so that one set of hat functions
-    serves them all.
+    candidates of a pixel lie equally far behind the first knot of their wrap, so that one set of
+    hat functions serves them all.
     """
     place = (wrapped_m * (KNOTS_PER_WRAP / unambiguous_m)).unsqueeze(1)
     classes = scores.shape[1] // KNOTS_PER_WRAP
@@ -165,34 +231,37 @@ def own_wraps(truth_m: Tensor, wrapped_m: Tensor, settings: Settings) -> Tensor:
 
     Not floor(truth / unambiguous range): near a boundary noise carries the phase over it.
     """
-    wraps = ((truth_m - wrapped_m) / settings.unambiguous_m).round()
-    return wraps.long().clamp(0, settings.classes - 1)
+    wraps = nearest_wraps(truth_m, wrapped_m, settings.unambiguous_m)
+    return wraps.long().clamp(max=settings.classes - 1)
 
 
 def knot_entropy(scores: Tensor, distance_m: Tensor, unambiguous_m: float) -> Tensor:
-    """Cross entropy [B, H, W] of the softmax over the knots, the truth shared between two knots."""
-    place = (distance_m * (KNOTS_PER_WRAP / unambiguous_m)).clamp(0, scores.shape[1] - 1.001)
-    lower = place.long().unsqueeze(1)
-    logarithms = scores.log_softmax(1)
-    ends = logarithms.gather(1, torch.cat((lower, lower + 1), 1))
+    """Cross entropy [B, H, W] of the softmax over the knots; a distance is shared by two knots."""
+    last = scores.shape[1] - 1
+    place = (distance_m * (KNOTS_PER_WRAP / unambiguous_m)).clamp(0, last)
+    lower = place.long().clamp(max=last - 1).unsqueeze(1)
+    ends = scores.log_softmax(1).gather(1, torch.cat((lower, lower + 1), 1))
     return -torch.lerp(ends[:, 0], ends[:, 1], place - lower.squeeze(1))
 
 
 def mean_distance_m(scores: Tensor, unambiguous_m: float) -> Tensor:
     """Mean [B, H, W] of the knots' distances under their softmax, metres."""
-    knots_m = torch.arange(scores.shape[1], device=scores.device) * (unambiguous_m / KNOTS_PER_WRAP)
-    return torch.einsum("bkhw,k->bhw", scores.softmax(1), knots_m.to(scores.dtype))
+    knots_m = torch.arange(scores.shape[1]).to(scores) * (unambiguous_m / KNOTS_PER_WRAP)
+    mean_m = torch.einsum("bkhw,k->bhw", scores.softmax(1), knots_m)
+    # The end itself would be in a wrap beyond the last.
+    return mean_m.clamp(max=float(knots_m[-1]) * (1 - 1e-6))
 
 
 def mean_over(values: Tensor, counted: Tensor) -> Tensor:
     """Mean of `values` where `counted`; 0 where nothing is."""
-    return (values * counted).sum() / counted.sum().clamp(min=1)
+    return torch.where(counted, values, 0).sum() / counted.sum().clamp(min=1)
 
 
-def usable(sensed: Sensed, sensor: SensorDescription) -> Tensor:
-    """Pixels bool [B, H, W] with signal enough and not saturated, as `unwrap.correction` has it."""
-    strong = first_phase(sensed, sensor).amplitude >= noise_of(sensed, sensor) * sensor.min_snr
-    return strong & ~samples_of(sensed).saturated
+def memory_maps(memory: Memory | None, like: Tensor, range_m: float) -> Tensor:
+    """Remembered distance over the range, and where there is one: [B, 2, H, W]; zeros without."""
+    if memory is None:
+        return torch.zeros_like(like).unsqueeze(1).repeat(1, 2, 1, 1)
+    return torch.stack((memory.distance_m * (memory.known / range_m), memory.known), 1)
 
 
 def doubted(memory: Memory, unambiguous_m: float) -> Memory:
@@ -207,6 +276,7 @@ def doubted(memory: Memory, unambiguous_m: float) -> Memory:
     fate = torch.rand(batch, 1, *BLOCKS, device=device)
     fate = functional.interpolate(fate, (height, width), mode="nearest").squeeze(1)
     known = memory.known * kept * weights_of(fate >= DOUBTED)
-    nearer, farther = weights_of(fate < 2 * DOUBTED), weights_of(fate >= 1 - DOUBTED)
+    nearer = weights_of((fate >= DOUBTED) & (fate < 2 * DOUBTED))
+    farther = weights_of(fate >= 1 - DOUBTED)
     moved_m = memory.distance_m + unambiguous_m * (farther - nearer)
     return replace(memory, distance_m=moved_m.clamp(min=0) * known, known=known)
