@@ -159,11 +159,11 @@ def bank_verify(arguments: Namespace) -> int:
 
 def unwrap_train(arguments: Namespace) -> int:
     """Train an unwrapping network."""
-    from shotenv.bank import open_bank
+    from agents.unwrapping import sources
     from unwrap.train import TrainConfig, train
 
     config = TrainConfig(**{name: arguments[name] for name in TrainConfig.model_fields})
-    print(f"The network is in {train(config, open_bank(config.bank).folder, arguments.out)}")
+    print(f"The network is in {train(config, sources(config), arguments.out)}")
     return DONE
 
 

@@ -9,14 +9,35 @@ from typing import Any, Final
 
 import torch
 
-from shotenv.bank import Clip
+from shotenv.bank import Clip, open_bank
 from shotenv.core import Problem
 from shotenv.drive import draw_drive
 from shotenv.measure import acquire_depth, noise_of
+from shotenv.resolve import env_config
+from shotenv.sensed import SensedFrames
 from unwrap.acquisition import Shots
 from unwrap.evaluate import Scores, evaluate, mean_scores
+from unwrap.train_config import TrainConfig
 
 SHOWN: Final = ("wrap_accuracy", "valid_share", "mae_m", "rmse_m", "abs_rel", "p95_m")
+
+
+def sources(config: TrainConfig) -> Callable[[str], SensedFrames]:
+    """Frames of each split of the bank that a network is trained on; the bank is rendered first."""
+    bank, sensor = open_bank(config.bank), env_config(sensor=config.sensor)
+
+    def frames(split: str) -> SensedFrames:
+        return SensedFrames(
+            bank,
+            bank.frames(split, by=config.split_by),
+            sensor,
+            range_m=config.clamp_m,
+            truth=config.truth,
+            stride=config.stride,
+            remembers=config.memory,
+        )
+
+    return frames
 
 
 def measure_unwrapping(

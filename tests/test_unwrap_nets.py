@@ -8,10 +8,10 @@ from unwrap.nets import (
     TofSegNet,
     class_depth_m,
     convolution,
-    multiply_accumulates,
     pad,
 )
-from unwrap.weights import build
+from unwrap.network import Settings, multiply_accumulates
+from unwrap.zoo import build
 
 
 @pytest.mark.parametrize(("height", "width"), [(32, 64), (45, 61), (33, 32), (5, 100)])
@@ -75,14 +75,14 @@ def test_every_parameter_gets_a_gradient():
 )
 def test_build_refuses_impossible_networks(metadata, message):
     with pytest.raises(ValueError, match=message):
-        build(metadata)
+        build(metadata["network"], Settings.of(metadata))
 
 
 def test_multiply_accumulates_of_known_layers():
     layers = nn.Sequential(nn.Conv2d(1, 6, 3, 2, 1), nn.ConvTranspose2d(6, 5, 2, stride=2))
     convolved, transposed = 8 * 10 * 6 * 9, 8 * 10 * 6 * 5 * 4
-    assert multiply_accumulates(layers, 16, 20) == convolved + transposed
-    assert multiply_accumulates(convolution(1, 2), 4, 4) == 16 * 2 * 9
+    assert multiply_accumulates(layers, torch.zeros(1, 1, 16, 20)) == convolved + transposed
+    assert multiply_accumulates(convolution(1, 2), torch.zeros(1, 1, 4, 4)) == 16 * 2 * 9
 
 
 @pytest.mark.parametrize(

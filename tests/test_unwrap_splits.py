@@ -1,8 +1,6 @@
 import numpy as np
 import pytest
-from unwrap_bank import FRAMES, write_bank
 
-from unwrap.data import BankFrames
 from unwrap.splits import FEWEST_FRAMES, RANDOM_SPLITS, random_split
 
 
@@ -32,19 +30,3 @@ def test_a_random_split_leaks_neighbours_and_that_is_its_point():
 def test_too_few_frames_are_refused():
     with pytest.raises(ValueError, match=r"frames is 9; .* at least 10"):
         random_split(9)
-
-
-def test_bank_frames_by_frame_deals_all_frames_but_those_of_the_shift(tmp_path):
-    bank = write_bank(tmp_path, train=8, validation=1, test=1, shift=2)
-    parts = [BankFrames(bank, split, 30.0, by="frame") for split in RANDOM_SPLITS]
-    assert [len(part) for part in parts] == [16, 2, 2]
-    dealt = [frame for part in parts for frame in part._frames]
-    assert len(set(dealt)) == 10 * FRAMES
-    assert not any("shift" in folder.name for folder, _ in dealt)
-
-
-def test_the_shift_split_is_whole_clips(tmp_path):
-    bank = write_bank(tmp_path, train=8, shift=2)
-    assert len(BankFrames(bank, "shift", 30.0)) == 2 * FRAMES
-    with pytest.raises(ValueError, match="no frame of split 'shift'"):
-        BankFrames(bank, "shift", 30.0, by="frame")

@@ -6,43 +6,45 @@ import pytest
 import torch
 from pydantic import ValidationError
 from safetensors.torch import load_file
-from unwrap_bank import write_bank
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+from unwrap_source import SENSOR, Walls
 
-from unwrap.data import BankFrames
-from unwrap.train import TrainConfig, TrainingModule, loss_of, train, wrap_classes, wrap_hits
+from unwrap.nets import wrap_classes
+from unwrap.network import Settings
+from unwrap.sensed import Truth
+from unwrap.train import TrainConfig, TrainingModule, train, wrap_hits
 from unwrap.unwrapper import load_unwrapper
 from unwrap.weights import save_weights
 
 SMALL = TrainConfig(width=4, epochs=2, batch_size=4)
 
 
-@pytest.fixture(scope="module")
-def bank(tmp_path_factory):
-    return write_bank(tmp_path_factory.mktemp("bank"))
+def walls(split):
+    frames = {"train": 8, "validation": 2, "test": 2}
+    return Walls(frames[split], seed=len(split))
 
 
-@pytest.mark.parametrize("network", ["tofregnet", "tofsegnet"])
-def test_training_writes_a_network_and_its_numbers(bank, tmp_path, network):
+@pytest.mark.parametrize("network", ["tofregnet", "tofsegnet", "toffusionnet"])
+def test_training_writes_a_network_and_its_numbers(tmp_path, network):
     config = SMALL.model_copy(update={"network": network})
-    path = train(config, bank, tmp_path, progress=False)
+    path = train(config, walls, tmp_path, progress=False)
     unwrapper = load_unwrapper(path)
     numbers = json.loads((tmp_path / f"{network}.json").read_text())
     assert unwrapper.name == network
-    assert unwrapper.metadata["bank"] == bank.name
+    assert unwrapper.metadata["bank"] == config.bank
     assert TrainConfig(**unwrapper.metadata["config"]) == config
     assert 0 <= numbers["test"]["wrap_accuracy"] <= 1
     assert set(numbers["test"]["families"]) == {"garage"}
 
 
-def test_loss_falls(bank):
+def test_loss_falls():
     """Forty steps on one batch."""
-    module = TrainingModule(SMALL, steps=40)
-    frames = BankFrames(bank, "train", 30.0)
-    gray, depth_m = (torch.stack(part) for part in zip(*(frames[i] for i in range(4)), strict=True))
+    module = TrainingModule(SMALL, SENSOR, steps=40)
+    sensed, truth = Walls(4).batch(range(4), draw=0, shots=None)
     optimizer = torch.optim.Adam(module.parameters(), 1e-2)
     losses = []
     for _ in range(40):
-        loss = loss_of(module(gray), depth_m, SMALL)
+        loss = module.network.loss(module(sensed), sensed, truth, SENSOR, SMALL.loss_weights)
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
@@ -50,12 +52,31 @@ def test_loss_falls(bank):
     assert losses[-1] < 0.75 * losses[0]
 
 
+@pytest.mark.parametrize("network", ["tofregnet", "tofsegnet"])
+def test_unknown_truth_teaches_nothing(network):
+    config = SMALL.model_copy(update={"network": network})
+    module = TrainingModule(config, SENSOR, steps=1)
+    sensed, truth = Walls(2).batch(range(2), draw=0, shots=None)
+    known = torch.rand(truth.known.shape, generator=torch.Generator().manual_seed(0)) < 0.5
+    output = module(sensed)
+    losses = [
+        module.network.loss(
+            output, sensed, Truth(depth_m, known), SENSOR, config.loss_weights
+        ).item()
+        for depth_m in (truth.distance_m, truth.distance_m.where(known, 0.0))
+    ]
+    assert losses[0] == losses[1]
+    assert (
+        losses[0] != module.network.loss(output, sensed, truth, SENSOR, config.loss_weights).item()
+    )
+
+
 class InterruptedHereError(Exception):
     pass
 
 
-def test_resumed_training_equals_uninterrupted(bank, tmp_path, monkeypatch):
-    whole = train(SMALL, bank, tmp_path / "whole", progress=False)
+def test_resumed_training_equals_uninterrupted(tmp_path, monkeypatch):
+    whole = train(SMALL, walls, tmp_path / "whole", progress=False)
     step = TrainingModule.training_step
 
     def failing(self, batch, index):
@@ -65,14 +86,14 @@ def test_resumed_training_equals_uninterrupted(bank, tmp_path, monkeypatch):
 
     monkeypatch.setattr(TrainingModule, "training_step", failing)
     with pytest.raises(InterruptedHereError):
-        train(SMALL, bank, tmp_path / "halves", progress=False)
+        train(SMALL, walls, tmp_path / "halves", progress=False)
     monkeypatch.undo()
-    halves = train(SMALL, bank, tmp_path / "halves", progress=False)
+    halves = train(SMALL, walls, tmp_path / "halves", progress=False)
     one, other = load_file(whole), load_file(halves)
     assert all(torch.equal(one[name], other[name]) for name in one)
 
 
-def test_interrupt_keeps_the_checkpoint(bank, tmp_path, monkeypatch):
+def test_interrupt_keeps_the_checkpoint(tmp_path, monkeypatch):
     step = TrainingModule.training_step
 
     def interrupting(self, batch, index):
@@ -83,22 +104,24 @@ def test_interrupt_keeps_the_checkpoint(bank, tmp_path, monkeypatch):
     monkeypatch.setattr(TrainingModule, "training_step", interrupting)
     handler = signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
-        train(SMALL, bank, tmp_path, progress=False)
+        train(SMALL, walls, tmp_path, progress=False)
     assert signal.getsignal(signal.SIGINT) is handler
-    assert [path.name for path in tmp_path.iterdir()] == ["tofregnet.ckpt"]
+    assert {path.name for path in tmp_path.iterdir()} == {"tofregnet.ckpt", "tensorboard"}
 
 
-def test_checkpoint_of_another_configuration_is_refused(bank, tmp_path):
-    train(SMALL, bank, tmp_path, progress=False)
+def test_checkpoint_of_another_configuration_is_refused(tmp_path):
+    train(SMALL, walls, tmp_path, progress=False)
     other = SMALL.model_copy(update={"seed": 1})
     with pytest.raises(ValueError, match="another configuration"):
-        train(other, bank, tmp_path, progress=False)
-    train(other, bank, tmp_path, resume=False, progress=False)
+        train(other, walls, tmp_path, progress=False)
+    train(other, walls, tmp_path, resume=False, progress=False)
 
 
-def test_unusable_bank_is_refused(tmp_path):
-    with pytest.raises(ValueError, match=r"manifest\.json"):
-        train(SMALL, tmp_path, tmp_path / "out", progress=False)
+def test_tensorboard_has_loss_accuracy_and_pictures(tmp_path):
+    train(SMALL, walls, tmp_path, progress=False)
+    log = EventAccumulator(str(tmp_path / "tensorboard" / "tofregnet")).Reload()
+    assert {"loss", "wrap_accuracy"} <= set(log.Tags()["scalars"])
+    assert len(log.Images("gray, true and predicted depth")) == SMALL.epochs
 
 
 def test_weights_depend_on_the_seed_alone():
@@ -111,7 +134,7 @@ def test_weights_depend_on_the_seed_alone():
 
 def test_schedule_rises_then_falls_to_the_final_rate():
     config = SMALL.model_copy(update={"warmup_share": 0.2})
-    made = TrainingModule(config, steps=100).configure_optimizers()
+    made = TrainingModule(config, SENSOR, steps=100).configure_optimizers()
     optimizer, schedule = made["optimizer"], made["lr_scheduler"]["scheduler"]
     rates = []
     for _ in range(101):
@@ -132,7 +155,7 @@ def test_configuration_is_checked(wrong):
 
 def test_classes_are_wraps_and_the_last_is_all_beyond():
     depth_m = torch.tensor([0.0, 6.2, 6.3, 24.9, 25.0, 30.0])
-    assert wrap_classes(depth_m, 6.2457, 5).tolist() == [0, 0, 1, 3, 4, 4]
+    assert wrap_classes(depth_m, Settings(classes=5)).tolist() == [0, 0, 1, 3, 4, 4]
 
 
 def test_hits_are_predictions_within_half_a_wrap():

@@ -1,34 +1,47 @@
-"""Gray images and true depths of a bank folder, as tensors for training.
-
-A bank is a folder with `manifest.json` and one folder per clip::
-
-    manifest.json               {"clips": [{"name", "family", "split", "folder", ...}, ...], ...}
-    <folder>/gray.npy           uint16  [F, H, W]     passive gray image, 0 .. 4095
-    <folder>/distance_m.npy     float32 [F, H, W]     true radial distance, inf for the sky
-    <folder>/correlation.npy    float32 [F, 8, H, W]  noise-free samples (not read here)
-    <folder>/active.npy, ambient.npy   float32 [F, H, W]  light (not read here)
-
-Arrays are memory mapped and never unpickled.
-"""
+"""What networks are trained on: batches of frames with their truth, in a new order each epoch."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Literal
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Literal, Protocol
 
 import numpy as np
 import torch
 from torch import Tensor
-from torch.utils.data import Dataset, Sampler
+from torch.utils.data import DataLoader, Dataset, Sampler
 
-from unwrap.splits import RANDOM_SPLITS, random_split
+from unwrap.acquisition import Shots
+from unwrap.correction import SensorDescription
+from unwrap.sensed import Sensed, Truth, mapped
 
 SplitBy = Literal["clip", "frame"]
 GRAY_FULL_SCALE = 4095
 """Largest word of the 12-bit gray image."""
+Batch = tuple[Sensed, Truth]
+
+
+class Source(Protocol):
+    """Frames that can be acquired again and again, each draw with other noise."""
+
+    @property
+    def sensor(self) -> SensorDescription:
+        """What delivers the frames."""
+        ...
+
+    @property
+    def families(self) -> Sequence[str]:
+        """Kind of scene of each frame."""
+        ...
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        ...
+
+    def batch(self, numbers: Sequence[int], *, draw: int, shots: Shots | None) -> Batch:
+        """Frames `numbers` with `shots` samples each, or none; the same draw gives the same."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -52,142 +65,91 @@ class Augmentation:
     brightness: float = 0.3
 
     def __call__(
-        self, gray: Tensor, depth_m: Tensor, *, generator: torch.Generator
-    ) -> tuple[Tensor, Tensor]:
-        """Vary gray [B, 1, H, W] in [0, 1] and its depth [B, H, W] alike; fresh tensors."""
-        batch = len(gray)
+        self, sensed: Sensed, truth: Truth, *, generator: torch.Generator
+    ) -> tuple[Sensed, Truth]:
+        """Vary frames and their truth alike; fresh tensors."""
+        batch = len(sensed)
         sideways, upside = torch.rand(2, batch, generator=generator) < 0.5
         exponent, factor = 2 * torch.rand(2, batch, generator=generator) - 1
-        if self.flip_horizontal:
-            gray, depth_m = _flip(gray, sideways, -1), _flip(depth_m, sideways, -1)
-        if self.flip_vertical:
-            gray, depth_m = _flip(gray, upside, -2), _flip(depth_m, upside, -2)
-        gamma = (1 + self.contrast) ** exponent.to(gray.device)
-        gain = (1 + self.brightness) ** factor.to(gray.device)
-        gray = gray ** gamma[:, None, None, None] * gain[:, None, None, None]
-        return gray.clamp(0, 1), depth_m
+        for wanted, chosen, axis in (
+            (self.flip_horizontal, sideways, -1),
+            (self.flip_vertical, upside, -2),
+        ):
+            if wanted:
+                flip = partial(_flip, chosen=chosen, axis=axis)
+                sensed, truth = mapped(flip, sensed), mapped(flip, truth)
+        gamma = (1 + self.contrast) ** exponent.to(sensed.gray.device)
+        gain = (1 + self.brightness) ** factor.to(sensed.gray.device)
+        gray = sensed.gray ** gamma[:, None, None] * gain[:, None, None]
+        return replace(sensed, gray=gray.clamp(0, 1)), truth
 
 
-def _flip(images: Tensor, chosen: Tensor, axis: int) -> Tensor:
+def _flip(images: Tensor, *, chosen: Tensor, axis: int) -> Tensor:
+    if images.ndim < 3:  # a number for each frame
+        return images
     chosen = chosen.to(images.device).reshape(-1, *[1] * (images.ndim - 1))
     return torch.where(chosen, images.flip(axis), images)
 
 
-class BankFrames(Dataset):
-    """Every frame of one split of a bank: (gray, depth_m).
+@dataclass(frozen=True)
+class Order:
+    """What one batch consists of."""
 
-    Gray is float32 [1, H, W] in [0, 1]; depth float32 [H, W] in metres, no farther than `range_m`
-    (also the sky).
+    numbers: tuple[int, ...]
+    draw: int
+    shots: Shots | None
 
-    Parameters
-    ----------
-    bank : Path
-        Folder of the bank.
-    split : str
-        "train", "validation", "test" or "shift".
-    range_m : float
-        Distance at which truth is clamped, metres.
-    by : "clip" or "frame"
-        Whole clips, as the manifest assigns them; or the paper's `random_split` of all frames
-        but those of the shift split.
 
-    Raises
-    ------
-    ValueError
-        No manifest, no clip of that split, or a clip whose arrays are missing or misshapen; the
-        message names the file.
+class Acquired(Dataset):
+    """Batches of a source, by their order."""
+
+    def __init__(self, source: Source):
+        self.source = source
+
+    def __getitem__(self, order: Order) -> Batch:
+        """Acquire one batch."""
+        return self.source.batch(order.numbers, draw=order.draw, shots=order.shots)
+
+
+class EpochShuffle(Sampler[Order]):
+    """Batches of all frames in a new order each epoch, which depends on seed and epoch alone.
+
+    Each epoch is another draw of the source, and each batch has one of the `shots`.
     """
 
-    def __init__(self, bank: Path, split: str, range_m: float, *, by: SplitBy = "clip"):
-        self.range_m = range_m
-        splits = (split,) if by == "clip" else RANDOM_SPLITS
-        clips = [clip for clip in read_clips(bank) if clip["split"] in splits]
-        if not clips or (by == "frame" and split not in RANDOM_SPLITS):
-            raise ValueError(
-                f"{bank}: no {by} of split {split!r}; render more clips or pick another bank"
-            )
-        frames = [
-            (bank / clip["folder"], frame, clip["family"])
-            for clip in clips
-            for frame in range(len(open_array(bank / clip["folder"] / "gray.npy", np.uint16)))
-        ]
-        if by == "frame":
-            frames = [frames[number] for number in random_split(len(frames))[split]]
-        self._frames = [(folder, frame) for folder, frame, _ in frames]
-        self.families = [family for *_, family in frames]
-
-    def __len__(self) -> int:
-        """Number of frames."""
-        return len(self._frames)
-
-    def __getitem__(self, index: int) -> tuple[Tensor, Tensor]:
-        """Gray and depth of one frame."""
-        folder, frame = self._frames[index]
-        gray = open_array(folder / "gray.npy", np.uint16)[frame].astype(np.float32)
-        distance = open_array(folder / "distance_m.npy", np.float32)[frame]
-        depth_m = np.minimum(distance, np.float32(self.range_m))
-        return torch.from_numpy(gray / GRAY_FULL_SCALE)[None], torch.from_numpy(depth_m)
-
-
-def read_clips(bank: Path) -> list[dict[str, Any]]:
-    """Clips that the manifest of `bank` lists.
-
-    Raises
-    ------
-    ValueError
-        The manifest is missing or damaged, or names a folder outside the bank.
-    """
-    path = bank / "manifest.json"
-    try:
-        clips = json.loads(path.read_text())["clips"]
-        known = [
-            {key: str(clip[key]) for key in ("name", "family", "split", "folder")} for clip in clips
-        ]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{path}: not the manifest of a bank ({error}); render the bank") from None
-    root = bank.resolve()
-    for clip in known:
-        if not (root / clip["folder"]).resolve().is_relative_to(root):
-            raise ValueError(f"{path}: clip folder {clip['folder']!r} lies outside the bank")
-    return known
-
-
-def open_array(path: Path, dtype: type) -> np.ndarray:
-    """Memory-mapped [F, H, W] array of a clip.
-
-    Raises
-    ------
-    ValueError
-        Missing, damaged, pickled, or of another type or number of dimensions.
-    """
-    try:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise ValueError(f"{path}: unreadable ({error}); render the bank again") from None
-    if array.dtype != dtype or array.ndim != 3:
-        raise ValueError(
-            f"{path}: {array.dtype} with {array.ndim} dimensions; expected "
-            f"{np.dtype(dtype)} [F, H, W]"
-        )
-    return array
-
-
-class EpochShuffle(Sampler[int]):
-    """A new order of `length` items each epoch that depends on seed and epoch alone."""
-
-    def __init__(self, length: int, seed: int):
-        self.length, self.seed, self.epoch = length, seed, 0
+    def __init__(self, frames: int, batch_size: int, shots: Sequence[Shots], seed: int):
+        self.frames, self.batch_size, self.shots, self.seed = frames, batch_size, shots, seed
+        self.epoch = 0
 
     def set_epoch(self, epoch: int) -> None:
         """Choose the order; the training loop calls this before each epoch."""
         self.epoch = epoch
 
-    def __iter__(self) -> Iterator[int]:
-        """Indices in this epoch's order."""
-        return iter(
-            np.random.default_rng((self.seed, self.epoch)).permutation(self.length).tolist()
-        )
+    def __iter__(self) -> Iterator[Order]:
+        """This epoch's batches."""
+        generator = np.random.default_rng((self.seed, self.epoch))
+        order = generator.permutation(self.frames).tolist()
+        for start in range(0, self.frames, self.batch_size):
+            shots = self.shots[int(generator.integers(len(self.shots)))] if self.shots else None
+            numbers = tuple(order[start : start + self.batch_size])
+            # Draw 0 is what networks are judged on.
+            yield Order(numbers, self.epoch + 1, shots)
 
     def __len__(self) -> int:
-        """Number of items."""
-        return self.length
+        """Number of batches."""
+        return -(-self.frames // self.batch_size)
+
+
+def in_order(source: Source, batch_size: int, shots: Sequence[Shots], *, draw: int) -> list[Order]:
+    """Batches of all frames in their own order, for each of the `shots` (or none)."""
+    numbers = range(len(source))
+    return [
+        Order(tuple(numbers[start : start + batch_size]), draw, count)
+        for count in (shots or (None,))
+        for start in range(0, len(source), batch_size)
+    ]
+
+
+def loader(source: Source, orders: Sampler[Order] | list[Order]) -> DataLoader:
+    """The batches of `source` in the given order."""
+    return DataLoader(Acquired(source), batch_size=None, sampler=orders)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Self
 
@@ -11,6 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from unwrap.correction import SensorDescription
+from unwrap.frames import RawFrame
 from unwrap.losses import LossWeights
 from unwrap.phase import unambiguous_range_m
 from unwrap.sensed import Sensed, Truth
@@ -98,6 +99,13 @@ class Network(nn.Module):
     def features(self, sensed: Sensed, sensor: SensorDescription) -> Tensor:
         """What `forward` takes, float32 [B, C, H, W], of frames that the sensor delivered."""
 
+    def example(self, height: int, width: int) -> Tensor:
+        """Features of a blank frame [1, C, H, W]."""
+        blank = torch.zeros(1, height, width, device=next(self.parameters()).device)
+        raw = RawFrame(blank.unsqueeze(1).expand(-1, 4, -1, -1), blank.bool())
+        sensed = Sensed(blank, raw, noise_lsb=blank + 1)
+        return self.features(sensed, SensorDescription(f1_hz=self.settings.f1_hz))
+
     @abstractmethod
     def loss(
         self,
@@ -108,6 +116,9 @@ class Network(nn.Module):
         weights: LossWeights,
     ) -> Tensor:
         """Scalar to be made small, from what `forward` gave."""
+
+    def calibrate(self, batches: Iterable[tuple[Sensed, Truth]], sensor: SensorDescription) -> None:
+        """Fit what turns scores into probabilities, after training; most networks have nothing."""
 
     @abstractmethod
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:

@@ -9,7 +9,8 @@ from typing import Any, TypeVar
 
 from torch import Tensor
 
-from unwrap.frames import RawFrame
+from unwrap.correction import Merge, SensorDescription, correct
+from unwrap.frames import DepthFrame, RawFrame
 
 Value = TypeVar("Value")
 
@@ -82,10 +83,37 @@ def mapped(function: Callable[[Tensor], Tensor], value: Value) -> Value:
     """`value`, a tensor or a dataclass of such values, with `function` applied to every tensor."""
     if isinstance(value, Tensor):
         return function(value)  # type: ignore[return-value]
-    if not dataclasses.is_dataclass(value):
+    if not dataclasses.is_dataclass(value) or isinstance(value, type):
         return value
     parts: dict[str, Any] = {
         field.name: mapped(function, getattr(value, field.name))
         for field in dataclasses.fields(value)
     }
-    return type(value)(**parts)
+    return type(value)(**parts)  # type: ignore[return-value]
+
+
+def unwrapped(
+    sensed: Sensed,
+    predicted_m: Tensor | None,
+    sensor: SensorDescription,
+    *,
+    merge: Merge = "nearest",
+) -> DepthFrame:
+    """`unwrap.correction.correct` of frames with samples and a prediction [B, H, W] for them.
+
+    Raises
+    ------
+    ValueError
+        No samples, or what `correct` refuses.
+    """
+    if sensed.raw is None:
+        raise ValueError("raw is None; expected samples")
+    return correct(
+        sensed.raw,
+        predicted_m,
+        sensor,
+        merge=merge,
+        offset_lsb=sensed.offset_lsb,
+        noise_lsb=sensed.noise_lsb,
+        shift_m=sensed.shift_m,
+    )

@@ -10,36 +10,15 @@ from torch import Tensor
 
 from unwrap.correction import Merge, SensorDescription, correct
 from unwrap.data import GRAY_FULL_SCALE
-from unwrap.nets import (
-    NETWORKS,
-    Autoencoder,
-    TofSegNet,
-    autocast,
-    class_depth_m,
-    multiply_accumulates,
-)
+from unwrap.network import Network, Prediction, autocast, multiply_accumulates
 from unwrap.phase import unambiguous_range_m
+from unwrap.sensed import Sensed, mapped
 from unwrap.weights import load_weights
+from unwrap.zoo import NAMES
 
 __all__ = ["Merge", "Prediction", "SensorDescription", "Unwrapper", "correct", "load_unwrapper"]
 
 SHIPPED = Path(__file__).parent / "weights"
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """What a network makes of a gray image.
-
-    Attributes
-    ----------
-    distance_m : float32 [B, H, W]
-        Coarse distance, metres.
-    confidence : float32 [B, H, W]
-        0..1, see `Unwrapper.predict`.
-    """
-
-    distance_m: Tensor
-    confidence: Tensor
 
 
 @dataclass(frozen=True)
@@ -49,8 +28,8 @@ class Unwrapper:
     Attributes
     ----------
     name : str
-        "tofregnet" or "tofsegnet".
-    network : Autoencoder
+        "tofregnet", "tofsegnet", "toffusionnet", or a peer's.
+    network : Network
         In evaluation mode.
     metadata : dict
         What is stored with the weights: width, frequency, training bank, recipe.
@@ -59,7 +38,7 @@ class Unwrapper:
     """
 
     name: str
-    network: Autoencoder = field(repr=False)
+    network: Network = field(repr=False)
     metadata: dict = field(repr=False)
     fingerprint: str
 
@@ -68,43 +47,58 @@ class Unwrapper:
         """Unambiguous range that the network was trained for, metres."""
         return unambiguous_range_m(self.metadata["f1_hz"])
 
-    @torch.inference_mode()
     def predict(self, gray: Tensor) -> Prediction:
-        """Coarse distance from gray images [B, H, W]: uint16 in 0..4095, or float in [0, 1].
+        """Coarse distance from gray images [B, H, W] alone: uint16 in 0..4095, or float in [0, 1].
 
-        TofSegNet predicts a distance within its likeliest class (see `nets.class_depth_m`), with
-        that class's probability as confidence. TofRegNet's confidence is the distance from its
-        prediction to the nearest wrap boundary over half the unambiguous range: 0 on a boundary,
-        1 halfway between two.
+        What the confidence means is told by the network's own `predict`.
+
+        Raises
+        ------
+        ValueError
+            Another shape, dtype or range, NaN, or a network that needs samples too.
+        """
+        if self.network.needs != "gray":
+            raise ValueError(f"{self.name} needs samples beside the gray image; use `look`")
+        return self.look(Sensed(as_float(gray)), SensorDescription(f1_hz=self.metadata["f1_hz"]))
+
+    @torch.inference_mode()
+    def look(self, sensed: Sensed, sensor: SensorDescription) -> Prediction:
+        """Distance from all that a sensor delivers.
 
         Frames are computed one by one, so that a prediction does not depend on its batch.
 
         Raises
         ------
         ValueError
-            Another shape, dtype or range, or NaN.
+            No samples, although the network needs them, or another modulation frequency.
         """
-        images = _as_float(gray)
+        if self.network.needs == "samples" and sensed.raw is None:
+            raise ValueError(f"raw is None; {self.name} needs the samples of each frame")
+        if sensor.f1_hz != self.metadata["f1_hz"]:
+            trained = f"{self.name} was trained for {self.metadata['f1_hz']:g}"
+            raise ValueError(f"f1_hz is {sensor.f1_hz:g}; {trained}")
         device = next(self.network.parameters()).device
-        with autocast(device):
-            outputs = [self.network(image[None, None].to(device)) for image in images]
-        output = torch.cat(outputs).to(gray.device)
-        return self._classes(output) if isinstance(self.network, TofSegNet) else self._depth(output)
 
-    def _classes(self, logits: Tensor) -> Prediction:
-        confidence = logits.float().softmax(1).amax(1)
-        return Prediction(class_depth_m(logits, self.unambiguous_m), confidence)
+        def only(index: int) -> Sensed:
+            return mapped(lambda tensor: tensor[index : index + 1].to(device), sensed)
 
-    def _depth(self, depth_m: Tensor) -> Prediction:
-        cycles = depth_m / self.unambiguous_m
-        return Prediction(depth_m, 2 * (cycles - cycles.round()).abs())
+        frames = [self._one(only(index), sensor) for index in range(len(sensed))]
+        return Prediction(
+            torch.cat([frame.distance_m for frame in frames]).to(sensed.gray.device),
+            torch.cat([frame.confidence for frame in frames]).to(sensed.gray.device),
+        )
+
+    def _one(self, sensed: Sensed, sensor: SensorDescription) -> Prediction:
+        with autocast(sensed.gray.device):
+            output = self.network(self.network.features(sensed, sensor))
+        return self.network.predict(output, sensed, sensor)
 
     def macs(self, height: int, width: int) -> int:
         """Multiply-accumulate operations of one frame of `height` x `width` pixels."""
-        return multiply_accumulates(self.network, height, width)
+        return multiply_accumulates(self.network, self.network.example(height, width))
 
 
-def _as_float(gray: Tensor) -> Tensor:
+def as_float(gray: Tensor) -> Tensor:
     """[B, H, W] in [0, 1], float32, checked."""
     if gray.ndim != 3 or 0 in gray.shape:
         raise ValueError(f"gray has shape {tuple(gray.shape)}; expected [B, H, W], not empty")
@@ -122,7 +116,7 @@ def _as_float(gray: Tensor) -> Tensor:
 
 
 def load_unwrapper(name_or_path: str | Path) -> Unwrapper:
-    """A trained network: "tofregnet", "tofsegnet", or the path of a safetensors file.
+    """A trained network: the name of a shipped one, or the path of a safetensors file.
 
     Raises
     ------
@@ -130,7 +124,7 @@ def load_unwrapper(name_or_path: str | Path) -> Unwrapper:
         The file is missing, damaged or no network of this project; the message names it and the
         cure.
     """
-    shipped = str(name_or_path) in NETWORKS
+    shipped = str(name_or_path) in NAMES
     path = SHIPPED / f"{name_or_path}.safetensors" if shipped else Path(name_or_path)
     weights = load_weights(path)
     network = weights.network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]

@@ -19,7 +19,8 @@ from safetensors.torch import save
 from torch import Tensor, nn
 
 from unwrap.files import write_bytes
-from unwrap.nets import NETWORKS, Autoencoder, TofRegNet, TofSegNet
+from unwrap.network import Network, Settings
+from unwrap.zoo import build
 
 SCHEMA = "1"
 """Version of the metadata."""
@@ -33,7 +34,7 @@ class Weights:
 
     Attributes
     ----------
-    network : Autoencoder
+    network : Network
         In evaluation mode, float32.
     metadata : dict
         What was stored with it.
@@ -41,7 +42,7 @@ class Weights:
         SHA-256 of the tensors, hexadecimal.
     """
 
-    network: Autoencoder
+    network: Network
     metadata: dict[str, Any]
     fingerprint: str
 
@@ -102,7 +103,7 @@ def _built(words: Mapping[str, str], tensors: Mapping[str, Tensor]) -> Weights:
     if words["sha256"] != digest:
         raise ValueError("its tensors do not match its checksum")
     metadata = {key: _value(word) for key, word in words.items()}
-    network = build(metadata)
+    network = build(metadata["network"], Settings.of(metadata))
     network.load_state_dict({name: tensor.to(_type_in(tensor)) for name, tensor in tensors.items()})
     return Weights(network.eval(), metadata, digest)
 
@@ -116,24 +117,3 @@ def _value(word: str) -> Any:
 
 def _type_in(tensor: Tensor) -> torch.dtype:
     return torch.float32 if tensor.is_floating_point() else tensor.dtype
-
-
-def build(metadata: Mapping[str, Any]) -> Autoencoder:
-    """The untrained network that `metadata` describes.
-
-    Raises
-    ------
-    ValueError
-        An unknown network, or a width, class count or range outside what is possible.
-    """
-    name, width = metadata["network"], metadata["width"]
-    if name not in NETWORKS:
-        raise ValueError(f"network is {name!r}; expected one of {', '.join(NETWORKS)}")
-    if not (isinstance(width, int) and 4 <= width <= 128):
-        raise ValueError(f"width is {width!r}; expected a whole number from 4 to 128")
-    if name == "tofregnet":
-        return TofRegNet(width, float(metadata["range_m"]))
-    classes = metadata["classes"]
-    if not (isinstance(classes, int) and 2 <= classes <= 16):
-        raise ValueError(f"classes is {classes!r}; expected a whole number from 2 to 16")
-    return TofSegNet(width, classes)
