@@ -15,9 +15,11 @@ from shotenv.laser import shot_cost
 from shotenv.sensor import (
     OffsetPattern,
     Purpose,
+    Sensitivity,
     draw_offsets,
     imager_temperature_k,
     residual_drift_m,
+    sensitivity,
     stream,
 )
 from unwrap.acquisition import Shots
@@ -40,6 +42,8 @@ class Drive:
         Optical power while on, time of one sample, ambient temperature.
     start_k : float64 [B]
         Laser temperature before the first frame.
+    sensitivity : Sensitivity
+        Electrons per light with this power and time.
     offsets : OffsetPattern
         Fixed pattern of the imager, [B, H, W].
     drift_m : float64 [B]
@@ -55,6 +59,7 @@ class Drive:
     integration_s: Tensor
     ambient_k: Tensor
     start_k: Tensor
+    sensitivity: Sensitivity
     offsets: OffsetPattern
     drift_m: Tensor
     always_eight: ShotCost
@@ -93,6 +98,7 @@ def draw_drive(
         integration_s=integration_s,
         ambient_k=ambient_k,
         start_k=ambient_k + unit[3:4] * (config.laser.release_k - ambient_k),
+        sensitivity=sensitivity(config.sensor, laser_power_w, integration_s),
         offsets=offsets,
         drift_m=residual_drift_m(config.sensor, imager_k),
         always_eight=shot_cost(

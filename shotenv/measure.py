@@ -15,6 +15,7 @@ from shotenv.reward import DepthScore, frame_sums, score_maps, score_of
 from shotenv.sensor import (
     Electrons,
     acquire,
+    charge,
     collect,
     noise_samples,
     sample_noise_lsb,
@@ -92,7 +93,7 @@ def acquire_depth(
     if noise is None:
         noise = noise_of(drive, step, bank.height, bank.width)
     exposure = bank.exposure(frames)
-    electrons = undiminished = collect(exposure, sensor, drive.laser_power_w, drive.integration_s)
+    electrons = undiminished = charge(exposure, sensor, drive.sensitivity)
     if power_w is not None:
         electrons = collect(exposure, sensor, power_w, drive.integration_s)
     raw = acquire(electrons, sensor, shots=shots, noise=noise, offsets=drive.offsets)

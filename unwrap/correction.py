@@ -18,7 +18,16 @@ from unwrap.calibration import WiggleTable, shift_turns
 from unwrap.dual import unwrap_dual
 from unwrap.frames import DepthFrame, PhaseFrame, RawFrame
 from unwrap.merge import merge_nearest, merge_regression
-from unwrap.phase import TWO_PI, decode_angle, distance_m, phase_of_turns, unambiguous_range_m
+from unwrap.phase import (
+    TWO_PI,
+    angle_of,
+    distance_m,
+    phase_of_turns,
+    quadratures_of,
+    sound_samples,
+    strength_of,
+    unambiguous_range_m,
+)
 
 Merge = Literal["nearest", "floor"]
 MERGES: dict[Merge, Callable[[Tensor, Tensor, float, float], Tensor]] = {
@@ -127,10 +136,10 @@ def correct_and_weigh(
     valid = torch.sub(first.amplitude, noise, alpha=sensor.min_snr).ge_(0)
     valid.gt_(raw.saturation)
     if raw.shots == Shots.EIGHT:
-        second = decode_at(1, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
+        second = quadratures_of(_samples_at(1, raw, offset_lsb))
         merged_m, residual_m = unwrap_dual(
             first.phase_rad,
-            second.phase_rad,
+            phase_at(1, *second, sensor, shift_m=shift_m),
             sensor.f1_hz,
             sensor.f2_hz,
             max_range_m=sensor.max_range_m,
@@ -161,17 +170,35 @@ def decode_at(
     `shift_m` [B] is added to the wrapped distances: minus the drift that a real sensor's
     temperature tells; or what its compensation leaves, where samples are simulated without drift.
     """
+    samples = _samples_at(frequency, raw, offset_lsb)
+    quadratures = quadratures_of(samples)
+    phase_rad = phase_at(frequency, *quadratures, sensor, shift_m=shift_m)
+    return PhaseFrame(phase_rad, *strength_of(samples, *quadratures))
+
+
+def _samples_at(frequency: int, raw: RawFrame, offset_lsb: Tensor | None) -> Tensor:
     start = frequency * SAMPLES_PER_FREQUENCY
-    samples = raw.dcs_lsb[:, start : start + SAMPLES_PER_FREQUENCY]
-    frame = decode_angle(samples, offset_lsb=offset_lsb)
+    return sound_samples(raw.dcs_lsb[:, start : start + SAMPLES_PER_FREQUENCY], offset_lsb)
+
+
+def phase_at(
+    frequency: int,
+    cosine: Tensor,
+    sine: Tensor,
+    sensor: SensorDescription,
+    *,
+    shift_m: Tensor | None,
+) -> Tensor:
+    """Phase [B, H, W] in [0, 2 pi) of quadratures at f1 (0) or f2 (1); see `decode_at`."""
+    angle_rad = angle_of(cosine, sine)
     if shift_m is None:
         shift_m = torch.zeros(1)
-    shift = shift_turns(shift_m, (sensor.f1_hz, sensor.f2_hz)[frequency]).to(samples)
+    shift = shift_turns(shift_m, (sensor.f1_hz, sensor.f2_hz)[frequency]).to(angle_rad)
     if sensor.wiggle is None:
-        turns = torch.add(shift, frame.phase_rad, alpha=1 / TWO_PI)
+        turns = torch.add(shift, angle_rad, alpha=1 / TWO_PI)
     else:
-        turns = sensor.wiggle[frequency].turns_of(frame.phase_rad).add_(shift)
-    return PhaseFrame(phase_of_turns(turns), frame.amplitude, frame.residual)
+        turns = sensor.wiggle[frequency].turns_of(angle_rad).add_(shift)
+    return phase_of_turns(turns)
 
 
 def _merged(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import torch
 from torch import Tensor
@@ -16,9 +17,9 @@ def unwrap_dual(
 ) -> tuple[Tensor, Tensor]:
     """Distance from the wrapped phases at two frequencies.
 
-    Every wrap of f1 up to `max_range_m` is tried with its nearest wrap of f2; the smallest
-    disagreement wins. The two distances are fused by inverse variance: at equal phase noise the
-    standard deviation goes with 1 / f, so the weights go with f^2.
+    Of all wraps of f1 up to `max_range_m`, each with its nearest wrap of f2, the one with the
+    smallest disagreement wins. The two distances are fused by inverse variance: at equal phase
+    noise the standard deviation goes with 1 / f, so the weights go with f^2.
 
     Parameters
     ----------
@@ -45,24 +46,33 @@ def unwrap_dual(
     wrapped1_m, wrapped2_m = distance_m(phase1_rad, f1_hz), distance_m(phase2_rad, f2_hz)
     # Disagreements are held in wraps of f2, where the nearest candidate is a rounding away.
     gap = (wrapped1_m - wrapped2_m).mul_(1 / range2_m)
-    wrap = gap.new_tensor(range1_m / range2_m)
-    wraps, least = torch.zeros_like(gap), _from_whole(gap.clone()).abs_()
-    for n in range(1, math.floor(max_range_m / range1_m) + 1):
-        apart = _from_whole(torch.add(gap, wrap, alpha=n)).abs_()
-        better = below(apart, least)
-        if (n + 1) * range1_m > max_range_m:
-            better.mul_(below(wrapped1_m, max_range_m - n * range1_m))
-        torch.minimum(least, apart, out=least)
-        torch.maximum(wraps, better.mul_(n), out=wraps)
-    best = _from_whole(gap.addcmul_(wraps, wrap))
+    last = math.floor(max_range_m / range1_m)
+    wraps = _nearest(gap, range1_m / range2_m, last + 1)
+    if last:
+        fits = below(wrapped1_m, max_range_m - last * range1_m)
+        wraps = _nearest(gap, range1_m / range2_m, last).lerp_(wraps, fits)
+    best = gap.add_(wraps, alpha=range1_m / range2_m)
+    best.sub_(best.round())
     share2 = f2_hz**2 / (f1_hz**2 + f2_hz**2)
     fused_m = wrapped1_m.add_(wraps, alpha=range1_m).sub_(best, alpha=share2 * range2_m)
     return fused_m.clamp_(min=0), best.abs_().mul_(range2_m)
 
 
-def _from_whole(wraps: Tensor) -> Tensor:
-    """Signed distance from the nearest whole number, in place."""
-    return wraps.sub_(wraps.round())
+def _nearest(gap: Tensor, wrap: float, count: int) -> Tensor:
+    """The n below `count` that brings `gap` + n `wrap` nearest to a whole number.
+
+    Candidate n fits exactly where the fraction of the gap is that of -n `wrap`. On the circle of
+    fractions it is the nearest one up to half way to its neighbours.
+    """
+    places = sorted((-n * wrap % 1.0, n) for n in range(count))
+    # From half way between the last place and the first, that of no wrap, all the way round.
+    start = (places[-1][0] + 1.0) / 2.0
+    turned = gap.add(2.0 - start).frac_()
+    wraps, beyond = torch.zeros_like(gap), torch.empty_like(gap)
+    for (low, before), (high, after) in pairwise(places):
+        torch.ge(turned, (low + high) / 2.0 + 1.0 - start, out=beyond)
+        wraps.add_(beyond, alpha=after - before)
+    return wraps
 
 
 def _check(phase1: Tensor, phase2: Tensor, f1_hz: float, f2_hz: float, max_range_m: float) -> None:

@@ -7,7 +7,6 @@ by phi = 4 pi f d / c (mod 2 pi).
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import torch
@@ -46,33 +45,47 @@ def decode(dcs: Tensor, *, offset_lsb: Tensor | None = None) -> PhaseFrame:
     ValueError
         Another number of samples, another dtype, or a NaN or infinity; the message says where.
     """
-    frame = decode_angle(dcs, offset_lsb=offset_lsb)
-    turns = torch.add(frame.phase_rad.new_ones(()), frame.phase_rad, alpha=1 / TWO_PI)
-    return replace(frame, phase_rad=phase_of_turns(turns))
+    samples = sound_samples(dcs, offset_lsb)
+    quadratures = quadratures_of(samples)
+    angle_rad = angle_of(*quadratures)
+    turns = torch.add(angle_rad.new_ones(()), angle_rad, alpha=1 / TWO_PI)
+    return PhaseFrame(phase_of_turns(turns), *strength_of(samples, *quadratures))
 
 
-def decode_angle(dcs: Tensor, *, offset_lsb: Tensor | None = None) -> PhaseFrame:
-    """As `decode`, but with phases in [-pi, pi]."""
+def sound_samples(dcs: Tensor, offset_lsb: Tensor | None) -> Tensor:
+    """Samples [..., n, H, W], refused if they are unsound, without their offset [..., H, W]."""
     _check(dcs)
-    if offset_lsb is not None:
-        dcs = dcs - offset_lsb.unsqueeze(-3)
-    if dcs.shape[-3] == 2:
-        return PhaseFrame(*_polar(dcs), None)
-    first, opposite = dcs.split(2, dim=-3)
-    angle, length = _polar(first - opposite)
-    return PhaseFrame(angle, length.mul_(0.5), (first + opposite).abs_().amax(dim=-3))
+    return dcs if offset_lsb is None else dcs - offset_lsb.unsqueeze(-3)
 
 
-def _polar(quadratures: Tensor) -> tuple[Tensor, Tensor]:
-    """Angle and length of [..., 2, H, W], cosine and sine."""
-    cosine, sine = quadratures.unbind(-3)
-    return torch.atan2(sine, cosine), (cosine * cosine).addcmul_(sine, sine).sqrt_()
+def quadratures_of(samples: Tensor) -> tuple[Tensor, Tensor]:
+    """Cosine and sine [..., H, W]: D0 - D2 and D1 - D3 of four samples, D0 and D1 of two."""
+    if samples.shape[-3] == 2:
+        cosine, sine = samples.unbind(-3)
+    else:
+        first, opposite = samples.split(2, dim=-3)
+        cosine, sine = (first - opposite).unbind(-3)
+    return cosine, sine
+
+
+def angle_of(cosine: Tensor, sine: Tensor) -> Tensor:
+    """Phase in [-pi, pi]."""
+    return torch.atan2(sine, cosine)
+
+
+def strength_of(samples: Tensor, cosine: Tensor, sine: Tensor) -> tuple[Tensor, Tensor | None]:
+    """Amplitude and residual of samples and their quadratures, see `PhaseFrame`."""
+    length = (cosine * cosine).addcmul_(sine, sine).sqrt_()
+    if samples.shape[-3] == 2:
+        return length, None
+    first, opposite = samples.split(2, dim=-3)
+    return length.mul_(0.5), (first + opposite).abs_().amax(dim=-3)
 
 
 def phase_of_turns(turns: Tensor) -> Tensor:
     """Phase in [0, 2 pi), in place, of turns that are not negative.
 
-    A fraction of a turn is a whole number of steps of float and never rounds up to the next one.
+    The largest float below one, times 2 pi, rounds to one below 2 pi.
     """
     return turns.frac_().mul_(TWO_PI)
 

@@ -1,6 +1,15 @@
 """Light becomes electrons, noise and converter words."""
 
-from shotenv.sensor.acquire import Electrons, acquire, collect, expose, single_sample_snr
+from shotenv.sensor.acquire import (
+    Electrons,
+    Sensitivity,
+    acquire,
+    charge,
+    collect,
+    expose,
+    sensitivity,
+    single_sample_snr,
+)
 from shotenv.sensor.drift import distance_drift_m, imager_temperature_k, residual_drift_m
 from shotenv.sensor.electrons import electrons_per_radiance_second
 from shotenv.sensor.gray import capture_gray, sample_noise_lsb
@@ -11,8 +20,10 @@ __all__ = [
     "Electrons",
     "OffsetPattern",
     "Purpose",
+    "Sensitivity",
     "acquire",
     "capture_gray",
+    "charge",
     "collect",
     "distance_drift_m",
     "draw_noise",
@@ -23,6 +34,7 @@ __all__ = [
     "noise_samples",
     "residual_drift_m",
     "sample_noise_lsb",
+    "sensitivity",
     "single_sample_snr",
     "stream",
     "stream_seed",

@@ -88,16 +88,42 @@ class Electrons:
     per_correlation_e: Tensor
 
 
+@dataclass(frozen=True)
+class Sensitivity:
+    """Electrons of one sample per unit of light, at a laser power and integration time.
+
+    Attributes
+    ----------
+    ambient_e : float32 [B, 1, 1]
+        Per W m-2 sr-1 of ambient radiance.
+    active_e : float32 [B, 1, 1]
+        Per W m-2 sr-1 and watt of active radiance and its correlation.
+    """
+
+    ambient_e: Tensor
+    active_e: Tensor
+
+
+def sensitivity(sensor: SensorConfig, laser_power_w: Tensor, integration_s: Tensor) -> Sensitivity:
+    """Sensitivity at a laser power and an integration time, each [B]."""
+    ambient_e = electrons_per_radiance_second(sensor) * integration_s
+    both = (ambient_e, ambient_e * laser_power_w)
+    return Sensitivity(*(value.to(torch.float32).view(-1, 1, 1) for value in both))
+
+
+def charge(exposure: Exposure, sensor: SensorConfig, per_light: Sensitivity) -> Electrons:
+    """Electrons that each pixel collects in one sample, with a sensitivity that is known."""
+    active_e = exposure.active * per_light.active_e
+    ambient_e = exposure.ambient * per_light.ambient_e
+    mean_e = torch.lerp(active_e, ambient_e, 0.5).add_(sensor.read_noise_e**2)
+    return Electrons(active_e, ambient_e, mean_e, exposure.correlation, per_light.active_e)
+
+
 def collect(
     exposure: Exposure, sensor: SensorConfig, laser_power_w: Tensor, integration_s: Tensor
 ) -> Electrons:
     """Electrons that each pixel collects in one sample."""
-    in_sample = electrons_per_radiance_second(sensor) * integration_s
-    per_radiance = in_sample.to(exposure.ambient.dtype).view(-1, 1, 1)
-    per_watt = (in_sample * laser_power_w).to(exposure.ambient.dtype).view(-1, 1, 1)
-    active_e, ambient_e = exposure.active * per_watt, exposure.ambient * per_radiance
-    mean_e = torch.lerp(active_e, ambient_e, 0.5).add_(sensor.read_noise_e**2)
-    return Electrons(active_e, ambient_e, mean_e, exposure.correlation, per_watt)
+    return charge(exposure, sensor, sensitivity(sensor, laser_power_w, integration_s))
 
 
 def acquire(
