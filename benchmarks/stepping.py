@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from statistics import median
-from time import thread_time
 
 import numpy as np
 import torch
 
+from benchmarks.turns import alternately
 from shotenv.bank.store import write_clip, write_manifest
 from shotenv.core import open_problem, reset, step
 from shotenv.laser import start_laser
@@ -88,7 +86,7 @@ def single(fields: dict[str, object], shots: Shots) -> dict:
             pass
         torch.atan2(pixels[0], pixels[1])
 
-    step_s, least_s = alternately(play, least)
+    step_s, least_s = alternately(play, least, REPEATS)
     return {
         "name": f"step, {int(shots)} DCS / normals + atan2",
         "ratio": step_s / least_s,
@@ -118,16 +116,3 @@ def batched(fields: dict[str, object]) -> dict:
         "holds": many_s <= one_s,
         "note": f"{1e3 * many_s / DRIVES:.2f} ms per step against {1e3 * one_s / DRIVES:.2f} ms",
     }
-
-
-def alternately(
-    first: Callable[[], object], second: Callable[[], object], repeats: int = REPEATS
-) -> tuple[float, float]:
-    """Median processor seconds of both, measured in turns, so that a slow spell hits both."""
-    times: tuple[list[float], list[float]] = ([], [])
-    for _ in range(repeats):
-        for function, taken in zip((first, second), times, strict=True):
-            start = thread_time()
-            function()
-            taken.append(thread_time() - start)
-    return median(times[0]), median(times[1])
