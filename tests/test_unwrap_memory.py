@@ -1,14 +1,22 @@
 """Moved depth against closed forms of walls, points and turns, and against a rendered world."""
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
+from render_worlds import floor, mesh, square, world
+from render_worlds import wall as wall_ahead
 
+from shotenv.config import CameraConfig
+from shotenv.render import render_frame
+from shotenv.world.model import Motion
 from unwrap.memory import move_depth
 
 FOV_DEG = 60.0
 HEIGHT, WIDTH = 24, 32
+CAMERA = CameraConfig(width=48, height=36, samples_per_pixel=1, gray_instants=1, bounces=1)
 FOCAL = WIDTH / 2 / math.tan(math.radians(FOV_DEG / 2))
 
 
@@ -169,3 +177,33 @@ def test_each_frame_has_its_own_motion():
 def test_bad_input_is_named(distance, fov_deg, message):
     with pytest.raises(ValueError, match=message):
         move(distance, fov_deg=fov_deg)
+
+
+def side_wall(left_m: float) -> np.ndarray:
+    """A wall along the x axis, to the left."""
+    return square((0, left_m, 0), (60.0, 0, 0), (0, 0, 60.0))
+
+
+@pytest.mark.render
+@pytest.mark.parametrize("yaw_rate_rad_s", [0.5, -0.5])
+def test_moved_depth_agrees_with_the_rendered_next_frame(sensor, yaw_rate_rad_s):
+    """Signs and pixel order are those of the renderer, its worlds and its banks."""
+    corner = mesh(np.concatenate([wall_ahead(8.0), floor(), side_wall(3.0)]))
+    still = world(corner, height_m=1.3)
+    scene = replace(still, ego=Motion(still.ego.start, 6.0, yaw_rate_rad_s))
+    before, after = (
+        torch.from_numpy(render_frame(scene, time_s, CAMERA, sensor, seed=0).distance_m)[None]
+        for time_s in (0.0, 0.1)
+    )
+
+    def errors(forward_m, yaw_rad):
+        found = move(before, forward_m, yaw_rad, CAMERA.horizontal_fov_deg)
+        known = found.known > 0
+        assert known.float().mean() > 0.5
+        return (found.distance_m - after)[known].abs()
+
+    right = errors(0.6, 0.1 * yaw_rate_rad_s)
+    assert right.median() < 0.05
+    assert right.quantile(0.9) < 0.2
+    for wrong in (errors(-0.6, 0.1 * yaw_rate_rad_s), errors(0.6, -0.1 * yaw_rate_rad_s)):
+        assert wrong.median() > 2 * right.median()
