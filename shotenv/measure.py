@@ -144,7 +144,7 @@ def measure(
     )
     sums = frame_sums(*scored, *seen_maps(made, shots))
     count, pixels = len(scored), problem.bank.height * problem.bank.width
-    score = score_of(sums[:count], problem.config.sensor.max_range_m)
+    score = score_of(sums, problem.config.sensor.max_range_m)
     return Measured(score, seen_of(sums[count:], pixels))
 
 

@@ -113,7 +113,7 @@ DIVISORS = torch.tensor([5, 4, 4, 5, 5])
 
 
 def score_of(sums: Tensor, range_m: float) -> DepthScore:
-    """Score of the sums [6, B] of `score_maps`."""
+    """Score of sums [6 or more, B], of which the first six are those of `score_maps`."""
     counts = sums.index_select(0, DIVISORS)
     means = sums[:5] / counts.clamp(min=1)
     means[2].sqrt_()
@@ -159,7 +159,8 @@ def weights(config: RewardConfig) -> dict[str, float]:
 
 def reward(terms: dict[str, Tensor], config: RewardConfig) -> Tensor:
     """Minus the weighted sum of the terms, float64 [B]."""
-    total = torch.zeros_like(terms["error"])
-    for name, weight in weights(config).items():
+    weight_of = weights(config)
+    total = terms["error"] * -weight_of.pop("error")
+    for name, weight in weight_of.items():
         total.sub_(terms[name], alpha=weight)
     return total

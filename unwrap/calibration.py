@@ -19,7 +19,7 @@ from torch import Tensor
 
 from unwrap.files import write_json
 from unwrap.frames import PhaseFrame
-from unwrap.phase import BELOW_TWO_PI, TWO_PI, decode, phase_of_turns, unambiguous_range_m
+from unwrap.phase import BELOW_TWO_PI, TWO_PI, decode, phase_of_turns, turns_of, unambiguous_range_m
 
 BINS = 256
 LARGEST_FILE_BYTES = 2**20
@@ -55,7 +55,7 @@ class WiggleTable:
 
     @cached_property
     def _lines(self) -> Tensor:
-        """True turns a + b x at the place x of a phase in bins, one line per bin, [2, bins].
+        """What `turns_of` gives, a + b x at the place x of a phase in bins: [2, bins] of a and b.
 
         From -pi to 2 pi and a bin beyond, which is that of phases that round up.
         """
@@ -63,12 +63,12 @@ class WiggleTable:
         place = torch.arange(first + count + 2, dtype=torch.float64)
         errors = torch.tensor(self.error_rad, dtype=torch.float64).roll(first)
         errors = errors[place.long() % count] / TWO_PI
-        turns = (place - first) / count - errors
+        turns = 1.0 + (place - first) / count - errors
         slopes = turns.diff()
         return torch.stack((turns[:-1] - slopes * place[:-1], slopes))
 
     def turns_of(self, phase_rad: Tensor) -> Tensor:
-        """Phases without their error in turns, of the shape of decoded ones in [-pi, 2 pi)."""
+        """Phases in [-pi, 2 pi) as turns without their error, one more, so none is negative."""
         first, lines = self._first.to(phase_rad), self._lines.to(phase_rad)
         place = torch.add(first, phase_rad, alpha=len(self.error_rad) / TWO_PI).flatten()
         constant, slope = lines.index_select(1, place.to(torch.int32)).unbind(0)
@@ -76,8 +76,7 @@ class WiggleTable:
 
     def corrected(self, frame: PhaseFrame) -> PhaseFrame:
         """`frame` with the phase error removed."""
-        turns = self.turns_of(frame.phase_rad).add_(1.0)
-        return replace(frame, phase_rad=phase_of_turns(turns))
+        return replace(frame, phase_rad=phase_of_turns(self.turns_of(frame.phase_rad)))
 
 
 def shifted(frame: PhaseFrame, shift_m: Tensor, frequency_hz: float) -> PhaseFrame:
@@ -85,14 +84,14 @@ def shifted(frame: PhaseFrame, shift_m: Tensor, frequency_hz: float) -> PhaseFra
 
     What a delay does to the samples of a sine, 4 pi f shift / c on the phase.
     """
-    turns = shift_turns(shift_m, frequency_hz).to(frame.phase_rad)
-    turned = torch.add(turns, frame.phase_rad, alpha=1 / TWO_PI)
-    return replace(frame, phase_rad=phase_of_turns(turned))
+    turns = shift_turns(turns_of(frame.phase_rad), shift_m, frequency_hz)
+    return replace(frame, phase_rad=phase_of_turns(turns))
 
 
-def shift_turns(shift_m: Tensor, frequency_hz: float) -> Tensor:
-    """Turns [B, 1, 1] in [1, 2] by which `shift_m` [B] advances the phase, up to whole ones."""
-    return (shift_m / unambiguous_range_m(frequency_hz)).remainder(1.0).add_(1.0).view(-1, 1, 1)
+def shift_turns(turns: Tensor, shift_m: Tensor, frequency_hz: float) -> Tensor:
+    """Turns [B, H, W], in place, advanced by the distances `shift_m` [B] up to whole turns."""
+    range_m = unambiguous_range_m(frequency_hz)
+    return turns.add_(shift_m.remainder(range_m).to(turns).view(-1, 1, 1), alpha=1 / range_m)
 
 
 def wrapped(phase_rad: Tensor) -> Tensor:

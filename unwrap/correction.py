@@ -19,13 +19,13 @@ from unwrap.dual import unwrap_dual
 from unwrap.frames import DepthFrame, PhaseFrame, RawFrame
 from unwrap.merge import merge_nearest, merge_regression
 from unwrap.phase import (
-    TWO_PI,
     angle_of,
     distance_m,
     phase_of_turns,
     quadratures_of,
     sound_samples,
     strength_of,
+    turns_of,
     unambiguous_range_m,
 )
 
@@ -191,13 +191,10 @@ def phase_at(
 ) -> Tensor:
     """Phase [B, H, W] in [0, 2 pi) of quadratures at f1 (0) or f2 (1); see `decode_at`."""
     angle_rad = angle_of(cosine, sine)
-    if shift_m is None:
-        shift_m = torch.zeros(1)
-    shift = shift_turns(shift_m, (sensor.f1_hz, sensor.f2_hz)[frequency]).to(angle_rad)
-    if sensor.wiggle is None:
-        turns = torch.add(shift, angle_rad, alpha=1 / TWO_PI)
-    else:
-        turns = sensor.wiggle[frequency].turns_of(angle_rad).add_(shift)
+    straight = turns_of if sensor.wiggle is None else sensor.wiggle[frequency].turns_of
+    turns = straight(angle_rad)
+    if shift_m is not None:
+        shift_turns(turns, shift_m, (sensor.f1_hz, sensor.f2_hz)[frequency])
     return phase_of_turns(turns)
 
 

@@ -47,9 +47,8 @@ def decode(dcs: Tensor, *, offset_lsb: Tensor | None = None) -> PhaseFrame:
     """
     samples = sound_samples(dcs, offset_lsb)
     quadratures = quadratures_of(samples)
-    angle_rad = angle_of(*quadratures)
-    turns = torch.add(angle_rad.new_ones(()), angle_rad, alpha=1 / TWO_PI)
-    return PhaseFrame(phase_of_turns(turns), *strength_of(samples, *quadratures))
+    phase_rad = phase_of_turns(turns_of(angle_of(*quadratures)))
+    return PhaseFrame(phase_rad, *strength_of(samples, *quadratures))
 
 
 def sound_samples(dcs: Tensor, offset_lsb: Tensor | None) -> Tensor:
@@ -80,6 +79,11 @@ def strength_of(samples: Tensor, cosine: Tensor, sine: Tensor) -> tuple[Tensor, 
         return length, None
     first, opposite = samples.split(2, dim=-3)
     return length.mul_(0.5), (first + opposite).abs_().amax(dim=-3)
+
+
+def turns_of(phase_rad: Tensor) -> Tensor:
+    """Phases in [-pi, 2 pi) as turns, one more, so none is negative."""
+    return torch.add(phase_rad.new_ones(()), phase_rad, alpha=1 / TWO_PI)
 
 
 def phase_of_turns(turns: Tensor) -> Tensor:
