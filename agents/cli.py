@@ -198,6 +198,15 @@ def _unwrap_evaluate(parser: ArgumentParser) -> None:
     _json(parser)
 
 
+def _unwrap_table(parser: ArgumentParser) -> None:
+    from agents.comparison import TableConfig
+
+    _config(parser, TableConfig, "unwrap/table-small.yaml")
+    parser.add_argument("--only", nargs="+", metavar="NETWORK", help="train these, score nothing")
+    _out(parser, "runs/table", "folder of the networks, the table and the figure")
+    _json(parser)
+
+
 def _unwrap_correct(parser: ArgumentParser) -> None:
     from agents.correcting import add_arguments
 
@@ -236,6 +245,9 @@ COMMANDS = (
     Command("bank verify", "check every file of a bank against its checksum", _bank_verify),
     Command("unwrap train", "train an unwrapping network on a rendered bank", _unwrap_train),
     Command("unwrap evaluate", "measure an unwrapping network on a bank", _unwrap_evaluate),
+    Command(
+        "unwrap table", "train every method of the results table and score them", _unwrap_table
+    ),
     Command("unwrap correct", "correct recorded samples: depth, points, picture", _unwrap_correct),
     Command("unwrap export", "write a network as ONNX and check it against torch", _unwrap_export),
     Command("train", "train a scheduler with PPO; continues where it stopped", _train),

@@ -185,6 +185,17 @@ def unwrap_evaluate(arguments: Namespace) -> int:
     return DONE
 
 
+def unwrap_table(arguments: Namespace) -> int:
+    """Train, score and show every method of the results table."""
+    from agents.comparison import TableConfig
+    from agents.tabling import make_table
+
+    config = TableConfig(**{name: arguments[name] for name in TableConfig.model_fields})
+    rows = make_table(config, arguments.out, arguments.only)
+    _write_json(arguments, rows)
+    return DONE
+
+
 def unwrap_correct(arguments: Namespace) -> int:
     """Correct a recording."""
     from agents.correcting import correct_files

@@ -32,6 +32,8 @@ from unwrap.memory import move_depth
 from unwrap.sensed import Memory, Sensed, Truth, mapped, unwrapped
 
 TruthOf = Literal["rendered", "measured"]
+RECORDED_DRAW = 0
+"""Draw of the eight samples that measured truth is made of: it is recorded once."""
 
 
 class SensedFrames:
@@ -81,6 +83,7 @@ class SensedFrames:
         self.sensor: SensorDescription = describe(config.sensor)
         self.families = [bank.clip_of(index).family for index in frames.tolist()]
         self._drive = lru_cache(maxsize=64)(self._draw_drive)
+        self._recorded = lru_cache(maxsize=4096)(self._measured_truth)
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -94,7 +97,7 @@ class SensedFrames:
         sensed = self._sensed(frames, draw, shots)
         if self.remembers and shots is not None:
             sensed = replace(sensed, memory=self._memory(frames, draw, shots))
-        return sensed, self._truth(frames, draw)
+        return sensed, self._truth(frames)
 
     def scored(self, numbers: Sequence[int], *, draw: int) -> Tensor:
         """Pixels that count, bool [B, H, W]: truth within the range, signal to noise enough."""
@@ -167,14 +170,22 @@ class SensedFrames:
         """Depth of the frames before, as a network would have it that unwraps without fault."""
         starts = self._starts(frames)
         before = torch.maximum(frames - 1, starts)
-        predicted_m = self._exposure(before).distance_m.clamp(max=self.range_m)
-        depth = unwrapped(self._sensed(before, draw, shots), predicted_m, self.sensor)
+        sensed = self._sensed(before, draw, shots)
+        depth = unwrapped(sensed, self._true_m(before), self.sensor)
         seen = depth.valid & (frames > starts)[:, None, None]
         return self._moved(depth.distance_m.masked_fill(~seen, torch.nan), frames)
 
-    def _truth(self, frames: Tensor, draw: int) -> Truth:
+    def _truth(self, frames: Tensor) -> Truth:
         if self.truth_of == "measured":
-            depth = unwrapped(self._sensed(frames, draw, Shots.EIGHT), None, self.sensor)
-            return Truth(depth.distance_m.nan_to_num(0.0), depth.valid)
-        distance_m = self._exposure(frames).distance_m.clamp(max=self.range_m)
+            return concatenate([self._recorded(index) for index in frames.tolist()])
+        distance_m = self._true_m(frames)
         return Truth(distance_m, torch.ones_like(distance_m, dtype=torch.bool))
+
+    def _true_m(self, frames: Tensor) -> Tensor:
+        return self._thinned(self.bank.distance_m(frames)).clamp(max=self.range_m)
+
+    def _measured_truth(self, index: int) -> Truth:
+        """What eight samples tell of one frame, where the frequencies agree."""
+        sensed = self._sensed(torch.tensor([index]), RECORDED_DRAW, Shots.EIGHT)
+        depth = unwrapped(sensed, None, self.sensor)
+        return Truth(depth.distance_m.nan_to_num(0.0), depth.valid)

@@ -171,6 +171,10 @@ class Bank:
         rows = indices.tolist()
         return Exposure(**{name: self._gather(name, rows) for name in ARRAYS if name != "gray"})
 
+    def distance_m(self, indices: Tensor) -> Tensor:
+        """True radial distances float32 [B, H, W] of the frames `indices` [B], metres."""
+        return self._gather("distance_m", indices.tolist())
+
     def gray(self, indices: Tensor) -> Tensor:
         """Gray images uint16 [B, H, W] of the frames `indices` [B]."""
         return self._gather("gray", indices.tolist())

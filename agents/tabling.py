@@ -1,0 +1,94 @@
+"""The results table, made: bank, trainings, scores, page and figure."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+from agents.comparing import Method, classical_methods, methods_of, rows_of
+from agents.comparison import TableConfig, Training, trained, trainings
+from agents.comparison_page import PUBLISHED, Row, figure, tables
+from agents.unwrapping import sources
+from shotenv.progress import progress, say
+from shotenv.sensed import SensedFrames
+from unwrap.files import write_bytes, write_json
+from unwrap.train_config import TrainConfig
+from unwrap.unwrapper import Unwrapper
+
+PAGE, NUMBERS, FIGURE = "unwrapping.md", "unwrapping.json", "unwrapping.png"
+SHOWN = ("overcast_street", "garage", "night_road")
+"""Families of the frames that the figure shows."""
+
+
+def make_table(config: TableConfig, out: Path, only: Sequence[str] | None = None) -> list[Row]:
+    """Train what is not trained yet, score it, and write page, numbers and figure to `out`.
+
+    Everything that stands in `out` already is taken as it is, so that an interrupted table goes on
+    where it stopped, and several processes can train their share of it (`only`, names of
+    networks); these score nothing.
+
+    Raises
+    ------
+    ValueError
+        Another configuration was begun in `out`, or there is no such network.
+    """
+    wanted = [t for t in trainings(config) if not only or t.config.network in only]
+    if not wanted:
+        raise ValueError(f"only is {only}; expected some of {', '.join(config.networks)}")
+    networks = {training: trained(training, out) for training in wanted}
+    if only:
+        say(f"{len(networks)} networks stand in {out}")
+        return []
+    rows = _rows(networks)
+    write_json(out / NUMBERS, {"config": config.model_dump(mode="json"), "rows": rows})
+    write_bytes(out / PAGE, _page(config, rows).encode())
+    _write_figure(networks, out / FIGURE)
+    say(f"{out / PAGE}, {out / NUMBERS} and {out / FIGURE} are written")
+    return rows
+
+
+def _rows(networks: dict[Training, Unwrapper]) -> list[Row]:
+    """Rows of every split and truth that something was trained on, and of the held-out families."""
+    rows: list[Row] = []
+    for split_by, truth in dict.fromkeys((t.config.split_by, t.config.truth) for t in networks):
+        of = {
+            training: network
+            for training, network in networks.items()
+            if (training.config.split_by, training.config.truth) == (split_by, truth)
+        }
+        config = next(iter(of)).config
+        methods = [method for pair in of.items() for method in methods_of(*pair)]
+        if (split_by, truth) == ("clip", "rendered"):
+            methods += classical_methods(sources(config)("train"))
+            rows += _scored(methods, config, "shift", {"split": "shift", "truth": truth})
+        rows += _scored(methods, config, "test", {"split": split_by, "truth": truth})
+    return rows
+
+
+def _scored(
+    methods: list[Method], config: TrainConfig, split: str, of: dict[str, str]
+) -> list[Row]:
+    frames: SensedFrames = sources(config)(split)
+    with progress(len(frames), f"scoring {' '.join(of.values())}", "frame") as bar:
+        return [{**row, **of} for row in rows_of(methods, frames, tick=bar.update)]
+
+
+def _page(config: TableConfig, rows: list[Row]) -> str:
+    made = ", ".join(f"{name} {value}" for name, value in config.model_dump(mode="json").items())
+    return f"# Results table\n\n{made}\n\n{tables(rows)}\n### As published\n\n{PUBLISHED}"
+
+
+def _write_figure(networks: dict[Training, Unwrapper], path: Path) -> None:
+    """Gray networks first, the one that sees the samples last."""
+    shown = {
+        training.label: network
+        for training, network in networks.items()
+        if (training.config.split_by, training.config.truth) == ("clip", "rendered")
+        and training.config.network in ("tofregnet", "tofsegnet", "toffusionnet")
+    }
+    frames = sources(next(iter(networks)).config)("test")
+    numbers = [frames.families.index(family) for family in SHOWN if family in frames.families]
+    content = io.BytesIO()
+    figure(shown, frames, numbers).save(content, format="PNG", optimize=True)
+    write_bytes(path, content.getvalue())
