@@ -334,5 +334,5 @@ def test_temperatures_travel_with_the_weights():
 def test_network_is_hardly_larger_than_a_gray_one():
     gray, fused = TofRegNet(32).eval(), TofFusionNet(Settings(width=32)).eval()
     least = multiply_accumulates(gray, gray.example(96, 128))
-    assert least < multiply_accumulates(fused, fused.example(96, 128)) < 1.4 * least
+    assert least < multiply_accumulates(fused, fused.example(96, 128)) < 1.5 * least
     assert fused(fused.example(96, 128)).isfinite().all()

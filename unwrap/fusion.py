@@ -5,8 +5,9 @@ logarithm of a density. The pixel's own wrap candidates (wrapped distance plus w
 ranges) are looked up on it, so that a decision near a wrap boundary follows the phase as measured,
 noise and all; where a pixel has no usable signal the curve's mean is its distance.
 
-The body (`unwrap.nets.Autoencoder`) sees the scene at half resolution. What it finds is judged
-pixel by pixel, beside the pixel's own phase and amplitude, by a perceptron with one hidden layer.
+The body (`unwrap.nets.Autoencoder`) sees the scene at half resolution. What it finds is judged at
+full resolution by a small last stage, beside the phase and amplitude of each pixel and its
+neighbours.
 """
 
 from __future__ import annotations
@@ -71,7 +72,7 @@ class TofFusionNet(Autoencoder):
     def __init__(self, settings: Settings):
         super().__init__(settings, FEATURES, HIDDEN)
         self.judge = nn.Sequential(
-            convolution(HIDDEN + FEATURES, HIDDEN, kernel=1),
+            convolution(HIDDEN + FEATURES, HIDDEN),
             nn.Conv2d(HIDDEN, KNOTS_PER_WRAP * settings.classes + 2, 1),
         )
         self.register_buffer("temperature", torch.ones(2))
