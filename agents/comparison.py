@@ -64,7 +64,7 @@ class Training:
 
 RECIPES: dict[RecipeName, dict[str, Any]] = {
     "paper": {"equation_7_mean_share": 1.0, "wrap_weight": 0.0, "flip_vertical": True},
-    "ours": {},
+    "ours": {"clip_norm": 1.0},
 }
 LABELS: dict[str, str] = {
     "tofregnet": "TofRegNet",

@@ -60,8 +60,10 @@ def _rows(networks: dict[Training, Unwrapper]) -> list[Row]:
         config = next(iter(of)).config
         methods = [method for pair in of.items() for method in methods_of(*pair)]
         if (split_by, truth) == ("clip", "rendered"):
-            methods += classical_methods(sources(config)("train"))
-            rows += _scored(methods, config, "shift", {"split": "shift", "truth": truth})
+            training_frames = sources(config)("train")
+            methods += classical_methods(training_frames)
+            if any(clip.split == "shift" for clip in training_frames.bank.clips):
+                rows += _scored(methods, config, "shift", {"split": "shift", "truth": truth})
         rows += _scored(methods, config, "test", {"split": split_by, "truth": truth})
     return rows
 

@@ -211,6 +211,7 @@ def _trainer(config: TrainConfig, out: Path, progress: bool) -> lightning.Traine
         enable_progress_bar=progress,
         enable_model_summary=False,
         num_sanity_val_steps=0,
+        gradient_clip_val=config.clip_norm or None,
         logger=TensorBoardLogger(out, name="tensorboard", version=config.network),
         log_every_n_steps=1,
         devices=1,

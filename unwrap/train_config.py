@@ -45,6 +45,9 @@ class TrainConfig(BaseModel):
     final_learning_rate: float = Field(1e-6, ge=0, description="learning rate at the last step")
     warmup_share: float = Field(0.1, ge=0, lt=1, description="share of steps that rise linearly")
     weight_decay: float = Field(0.01, ge=0, description="decoupled decay; 0 is plain Adam")
+    clip_norm: float = Field(
+        0.0, ge=0, description="longest gradient; longer ones are shortened; 0 leaves all"
+    )
     equation_7_weight: float = Field(1.0, ge=0, description="weight of the paper's loss, eq. 7")
     equation_7_mean_share: float = Field(
         0.85, ge=0, le=1, description="lambda of L_SI; the paper's 1 leaves the mean error free"
