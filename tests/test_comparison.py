@@ -103,7 +103,8 @@ def test_the_table_is_made_once_and_goes_on_where_it_stopped(tiny_bank, tmp_path
     assert all(np.isfinite(row["mae_m"]) and 0 <= row["wrap_accuracy"] <= 1 for row in rows)
     page = (tmp_path / PAGE).read_text()
     assert all(row["method"] in page for row in rows)
-    assert Image.open(tmp_path / FIGURE).width > 300
+    with Image.open(tmp_path / FIGURE) as picture:
+        assert picture.width > 300
 
     def never(*_, **__):
         raise AssertionError("trained again")

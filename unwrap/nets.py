@@ -42,7 +42,7 @@ class BasicBlock(nn.Module):
 
     def forward(self, features: Tensor) -> Tensor:
         """[B, inputs, H, W] -> [B, outputs, H / stride, W / stride]."""
-        # The shortcut's stride is a slice: with AVX2 and few channels, oneDNN 3.12 corrupts memory in
+        # The shortcut's stride is a slice: with AVX2 and few channels, oneDNN 3.12 spoils memory in
         # the backward pass of strided convolutions of 1 x 1.
         kept = features[..., :: self.stride, :: self.stride]
         return functional.relu(self.second(self.first(features)) + self.shortcut(kept))
