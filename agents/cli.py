@@ -203,7 +203,10 @@ def _unwrap_table(parser: ArgumentParser) -> None:
 
     _config(parser, TableConfig, "unwrap/table-small.yaml")
     parser.add_argument("--only", nargs="+", metavar="NETWORK", help="train these, score nothing")
-    _out(parser, "runs/table", "folder of the networks, the table and the figure")
+    parser.add_argument(
+        "--page", type=Path, metavar="DIR", help="folder of the page; that of --out"
+    )
+    _out(parser, "runs/table", "folder of the networks")
     _json(parser)
 
 

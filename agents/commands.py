@@ -191,7 +191,7 @@ def unwrap_table(arguments: Namespace) -> int:
     from agents.tabling import make_table
 
     config = TableConfig(**{name: arguments[name] for name in TableConfig.model_fields})
-    rows = make_table(config, arguments.out, arguments.only)
+    rows = make_table(config, arguments.out, arguments.page, arguments.only)
     _write_json(arguments, rows)
     return DONE
 

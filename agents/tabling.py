@@ -4,25 +4,37 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from importlib import resources
 from pathlib import Path
+
+from jinja2 import Environment, StrictUndefined
 
 from agents.comparing import Method, classical_methods, methods_of, rows_of
 from agents.comparison import TableConfig, Training, trained, trainings
 from agents.comparison_page import PUBLISHED, Row, figure, tables
 from agents.unwrapping import sources
+from shotenv.config import SensorConfig, find_config, read_config
 from shotenv.progress import progress, say
 from shotenv.sensed import SensedFrames
 from unwrap.files import write_bytes, write_json
+from unwrap.phase import unambiguous_range_m
 from unwrap.train_config import TrainConfig
 from unwrap.unwrapper import Unwrapper
 
 PAGE, NUMBERS, FIGURE = "unwrapping.md", "unwrapping.json", "unwrapping.png"
+TEMPLATE = "unwrapping.md.jinja"
+FULL = TableConfig()
+"""The paper's size and length."""
 SHOWN = ("overcast_street", "garage", "night_road")
 """Families of the frames that the figure shows."""
 
 
-def make_table(config: TableConfig, out: Path, only: Sequence[str] | None = None) -> list[Row]:
-    """Train what is not trained yet, score it, and write page, numbers and figure to `out`.
+def make_table(
+    config: TableConfig, out: Path, page: Path | None = None, only: Sequence[str] | None = None
+) -> list[Row]:
+    """Train what is not trained yet into `out`, score it, and write page, numbers and figure.
+
+    These go to the folder `page`, or to `out`.
 
     Everything that stands in `out` already is taken as it is, so that an interrupted table goes on
     where it stopped, and several processes can train their share of it (`only`, names of
@@ -41,10 +53,12 @@ def make_table(config: TableConfig, out: Path, only: Sequence[str] | None = None
         say(f"{len(networks)} networks stand in {out}")
         return []
     rows = _rows(networks)
-    write_json(out / NUMBERS, {"config": config.model_dump(mode="json"), "rows": rows})
-    write_bytes(out / PAGE, _page(config, rows).encode())
-    _write_figure(networks, out / FIGURE)
-    say(f"{out / PAGE}, {out / NUMBERS} and {out / FIGURE} are written")
+    folder = out if page is None else page
+    folder.mkdir(parents=True, exist_ok=True)
+    write_json(folder / NUMBERS, {"config": config.model_dump(mode="json"), "rows": rows})
+    write_bytes(folder / PAGE, _page(config, rows).encode())
+    _write_figure(networks, folder / FIGURE)
+    say(f"{folder / PAGE}, {NUMBERS} and {FIGURE} are written")
     return rows
 
 
@@ -77,8 +91,22 @@ def _scored(
 
 
 def _page(config: TableConfig, rows: list[Row]) -> str:
-    made = ", ".join(f"{name} {value}" for name, value in config.model_dump(mode="json").items())
-    return f"# Results table\n\n{made}\n\n{tables(rows)}\n### As published\n\n{PUBLISHED}"
+    """The page, from its template."""
+    source = resources.files("agents") / "templates" / TEMPLATE
+    sensor = read_config(SensorConfig, find_config("sensor", config.sensor))
+    template = Environment(undefined=StrictUndefined, keep_trailing_newline=True).from_string(
+        source.read_text(encoding="utf-8")
+    )
+    return template.render(
+        config=config.model_dump(mode="json"),
+        small=config.width < FULL.width or config.epochs < FULL.epochs,
+        f1_hz=sensor.f1_hz,
+        unambiguous_m=unambiguous_range_m(sensor.f1_hz),
+        max_range_m=sensor.max_range_m,
+        min_snr=sensor.min_snr,
+        tables=tables(rows),
+        published=PUBLISHED,
+    )
 
 
 def _write_figure(networks: dict[Training, Unwrapper], path: Path) -> None:
