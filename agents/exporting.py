@@ -94,6 +94,7 @@ def metadata_of(
         "merge": exported.merge,
         "image_height": size[0],
         "image_width": size[1],
+        "every_row_and_column": unwrapper.stride(*size),
     }
     return {name: str(value) for name, value in values.items()}
 

@@ -18,6 +18,7 @@ from unwrap.correction import MERGES, Merge, SensorDescription
 from unwrap.data import GRAY_FULL_SCALE
 from unwrap.phase import unambiguous_range_m
 from unwrap.sensed import Sensed
+from unwrap.sizes import enlarged, thinned
 from unwrap.unwrapper import Unwrapper
 
 INPUTS = ("gray", "wrapped_m")
@@ -48,10 +49,9 @@ class Exported(nn.Module):
                 f"{unwrapper.name} needs the samples of each frame; expected a network that looks "
                 "at the gray image alone, such as tofregnet or tofsegnet"
             )
-        if sensor.f1_hz != unwrapper.metadata["f1_hz"]:
-            trained = f"{unwrapper.name} was trained for {unwrapper.metadata['f1_hz']:g}"
-            raise ValueError(f"f1_hz is {sensor.f1_hz:g}; {trained}")
-        self.network, self.sensor, self.merge = unwrapper.network, sensor, merge
+        unwrapper.require_frequency(sensor)
+        self.network, self.stride = unwrapper.network, unwrapper.stride
+        self.sensor, self.merge = sensor, merge
 
     def forward(self, gray: Tensor, wrapped_m: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Predicted distance, wraps and corrected distance.
@@ -69,9 +69,11 @@ class Exported(nn.Module):
             The network's distance; whole unambiguous ranges from `wrapped_m` to `distance_m`,
             rounded; and the two merged.
         """
-        sensed = Sensed(gray.to(torch.float32) / GRAY_FULL_SCALE)
-        output = self.network(self.network.features(sensed, self.sensor))
-        predicted_m = self.network.predict(output, sensed, self.sensor).distance_m
+        stride = self.stride(*gray.shape[-2:])
+        shown = thinned(Sensed(gray.to(torch.float32) / GRAY_FULL_SCALE), stride)
+        output = self.network(self.network.features(shown, self.sensor))
+        shown_m = self.network.predict(output, shown, self.sensor).distance_m
+        predicted_m = enlarged(shown_m, stride)
         unambiguous_m = unambiguous_range_m(self.sensor.f1_hz)
         distance_m = MERGES[self.merge](
             predicted_m, wrapped_m, unambiguous_m, self.sensor.saturation_range_m

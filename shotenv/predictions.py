@@ -2,6 +2,7 @@
 
     <cache>/predictions/<bank>-<network>/distance_m.npy, confidence.npy, kept.json
 
+Where the network is shown every k-th row and column (`unwrap.sizes`) -k follows its name.
 The folder is written under a hidden name, flushed and renamed; `kept.json` holds each file's
 sha256. Kept predictions that are damaged are computed again.
 """
@@ -54,6 +55,9 @@ def _rows(maps: Tensor, frames: Tensor) -> Tensor:
 def keep_predictions(bank: Bank, unwrapper: Unwrapper) -> KeptPredictions:
     """Predictions of `unwrapper` for `bank`, from the cache folder or computed now."""
     name = f"{bank.fingerprint}-{unwrapper.fingerprint[:16]}"
+    stride = unwrapper.stride(bank.height, bank.width)
+    if stride > 1:
+        name += f"-{stride}"
     folder = cache_dir() / "predictions" / name
     kept = _load(folder, bank)
     if kept is None:

@@ -98,6 +98,21 @@ def test_the_floor_merge_of_classes_is_equation_8(tmp_path, segmenting):
     assert (np.abs(found["distance_m"] - expected_m.numpy()) < 1e-3).mean() > 0.999
 
 
+def test_a_large_frame_is_thinned_inside_the_file(tmp_path, segmenting):
+    small = {"trained_height": HEIGHT // 2, "trained_width": WIDTH // 2}
+    unwrapper, path = load_unwrapper(segmenting), tmp_path / "small.safetensors"
+    save_weights(path, unwrapper.network, {**unwrapper.metadata, **small})
+    assert export(path, "--out", tmp_path / "small.onnx", "--check-bank", "none") == 0
+    gray, wrapped_m = images(2)
+    found = run(tmp_path / "small.onnx", gray, wrapped_m)
+    predicted_m = load_unwrapper(path).predict(torch.from_numpy(gray)).distance_m.numpy()
+    assert (np.abs(found["predicted_m"] - predicted_m) < 1e-2).mean() > 0.999
+    seen = unwrapper.predict(torch.from_numpy(gray[:, ::2, ::2].copy())).distance_m.numpy()
+    assert (np.abs(found["predicted_m"][:, ::2, ::2] - seen) < 1e-2).mean() > 0.999
+    told = onnxruntime.InferenceSession(tmp_path / "small.onnx").get_modelmeta()
+    assert told.custom_metadata_map["every_row_and_column"] == "2"
+
+
 @pytest.mark.parametrize("name", ["net.onnx", "net.int8.onnx"])
 def test_files_tell_their_inputs_and_where_they_come_from(written, tiny_unwrapper, name):
     session = onnxruntime.InferenceSession(written / name, providers=["CPUExecutionProvider"])

@@ -7,11 +7,12 @@ import torch
 from pydantic import ValidationError
 from safetensors.torch import load_file
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
-from unwrap_source import SENSOR, Walls
+from unwrap_source import HEIGHT, SENSOR, WIDTH, Walls
 
 from unwrap.nets import wrap_classes
 from unwrap.network import Settings
 from unwrap.sensed import Truth
+from unwrap.sizes import trained_size
 from unwrap.train import TrainConfig, TrainingModule, train, wrap_hits
 from unwrap.unwrapper import load_unwrapper
 from unwrap.weights import save_weights
@@ -33,6 +34,7 @@ def test_training_writes_a_network_and_its_numbers(tmp_path, network):
     assert unwrapper.name == network
     assert unwrapper.metadata["bank"] == config.bank
     assert TrainConfig(**unwrapper.metadata["config"]) == config
+    assert trained_size(unwrapper.metadata) == (HEIGHT, WIDTH)
     assert 0 <= numbers["test"]["wrap_accuracy"] <= 1
     assert set(numbers["test"]["families"]) == {"garage"}
 

@@ -248,12 +248,15 @@ def _write(module: TrainingModule, test: Source, out: Path) -> Path:
     """Write the weights, then the numbers measured with them."""
     config = module.config
     path = out / f"{config.network}.safetensors"
+    height, width = test.batch([0], draw=JUDGED_DRAW, shots=None)[0].gray.shape[-2:]
     metadata = {
         "network": config.network,
         "width": config.width,
         "classes": config.classes,
         "range_m": config.clamp_m,
         "f1_hz": config.f1_hz,
+        "trained_height": height,
+        "trained_width": width,
         "bank": Path(config.bank).name,
         "config": config.model_dump(mode="json"),
     }

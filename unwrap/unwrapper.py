@@ -13,6 +13,7 @@ from unwrap.data import GRAY_FULL_SCALE
 from unwrap.network import Network, Prediction, autocast, multiply_accumulates
 from unwrap.phase import unambiguous_range_m
 from unwrap.sensed import Sensed, mapped
+from unwrap.sizes import restored, stride_to, thinned, trained_size
 from unwrap.weights import load_weights
 from unwrap.zoo import NAMES
 
@@ -32,7 +33,7 @@ class Unwrapper:
     network : Network
         In evaluation mode.
     metadata : dict
-        What is stored with the weights: width, frequency, training bank, recipe.
+        What is stored with the weights: width, frequency, size of the training frames, recipe.
     fingerprint : str
         SHA-256 of the weights; predictions may be kept under this key.
     """
@@ -47,10 +48,20 @@ class Unwrapper:
         """Unambiguous range that the network was trained for, metres."""
         return unambiguous_range_m(self.metadata["f1_hz"])
 
+    def stride(self, height: int, width: int) -> int:
+        """Every how many rows and columns of a frame the network is shown.
+
+        k where height and width are k times those of the training frames, else 1; see
+        `unwrap.sizes`.
+        """
+        return stride_to(trained_size(self.metadata), (height, width))
+
     def predict(self, gray: Tensor) -> Prediction:
         """Coarse distance from gray images [B, H, W] alone: uint16 in 0..4095, or float in [0, 1].
 
-        What the confidence means is told by the network's own `predict`.
+        What the confidence means is told by the network's own `predict`. The network is shown
+        every k-th row and column of images k times as high and wide as those it was trained on,
+        and distance and confidence in between are interpolated; other sizes it sees as they are.
 
         Raises
         ------
@@ -65,7 +76,10 @@ class Unwrapper:
     def look(self, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         """Distance from all that a sensor delivers.
 
-        Frames are computed one by one, so that a prediction does not depend on its batch.
+        Frames are computed one by one, so that a prediction does not depend on its batch. Those k
+        times as high and wide as the training frames are thinned as in `predict`; a network that
+        needs samples then tells only the wraps of pixels with a usable signal, which are added to
+        each pixel's own wrapped distance.
 
         Raises
         ------
@@ -74,9 +88,7 @@ class Unwrapper:
         """
         if self.network.needs == "samples" and sensed.raw is None:
             raise ValueError(f"raw is None; {self.name} needs the samples of each frame")
-        if sensor.f1_hz != self.metadata["f1_hz"]:
-            trained = f"{self.name} was trained for {self.metadata['f1_hz']:g}"
-            raise ValueError(f"f1_hz is {sensor.f1_hz:g}; {trained}")
+        self.require_frequency(sensor)
         device = next(self.network.parameters()).device
 
         def only(index: int) -> Sensed:
@@ -88,14 +100,29 @@ class Unwrapper:
             torch.cat([frame.confidence for frame in frames]).to(sensed.gray.device),
         )
 
+    def require_frequency(self, sensor: SensorDescription) -> None:
+        """Raise ValueError unless the network was trained for the sensor's first frequency."""
+        if sensor.f1_hz != self.metadata["f1_hz"]:
+            trained = f"{self.name} was trained for {self.metadata['f1_hz']:g}"
+            raise ValueError(f"f1_hz is {sensor.f1_hz:g}; {trained}")
+
     def _one(self, sensed: Sensed, sensor: SensorDescription) -> Prediction:
+        stride = self.stride(*sensed.gray.shape[-2:])
+        shown = thinned(sensed, stride)
         with autocast(sensed.gray.device):
-            output = self.network(self.network.features(sensed, sensor))
-        return self.network.predict(output, sensed, sensor)
+            output = self.network(self.network.features(shown, sensor))
+        prediction = self.network.predict(output, shown, sensor)
+        return restored(prediction, sensed, sensor, stride, self.network.needs)
 
     def macs(self, height: int, width: int) -> int:
-        """Multiply-accumulate operations of one frame of `height` x `width` pixels."""
-        return multiply_accumulates(self.network, self.network.example(height, width))
+        """Multiply-accumulate operations of one frame of `height` x `width` pixels.
+
+        Of those pixels that the network is shown.
+        """
+        stride = self.stride(height, width)
+        return multiply_accumulates(
+            self.network, self.network.example(height // stride, width // stride)
+        )
 
 
 def as_float(gray: Tensor) -> Tensor:

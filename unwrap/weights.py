@@ -20,6 +20,7 @@ from torch import Tensor, nn
 
 from unwrap.files import write_bytes
 from unwrap.network import Network, Settings
+from unwrap.sizes import trained_size
 from unwrap.zoo import build
 
 SCHEMA = "1"
@@ -103,6 +104,7 @@ def _built(words: Mapping[str, str], tensors: Mapping[str, Tensor]) -> Weights:
     if words["sha256"] != digest:
         raise ValueError("its tensors do not match its checksum")
     metadata = {key: _value(word) for key, word in words.items()}
+    trained_size(metadata)  # refused here rather than at the first frame
     network = build(metadata["network"], Settings.of(metadata))
     network.load_state_dict({name: tensor.to(_type_in(tensor)) for name, tensor in tensors.items()})
     return Weights(network.eval(), metadata, digest)
