@@ -7,7 +7,9 @@ import importlib
 import json
 from pathlib import Path
 
-BENCHMARKS = ("stepping", "sensing", "rendering")
+from benchmarks.rows import printed
+
+BENCHMARKS = ("stepping", "sensing", "rendering", "networks")
 
 
 def main() -> None:
@@ -19,9 +21,7 @@ def main() -> None:
     for name in arguments.names:
         rows += importlib.import_module(f"benchmarks.{name}").run()
     for row in rows:
-        verdict = "holds" if row["holds"] else "MISSED"
-        print(f"{row['name']:45} {row['ratio']:6.2f}  goal <= {row['goal']:<5} {verdict}")
-        print(f"    {row['note']}")
+        print(printed(row))
     arguments.json.write_text(json.dumps(rows, indent=1) + "\n")
     print(f"Numbers: {arguments.json}")
 

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.rows import row
 from shotenv.config import CameraConfig, SensorConfig, WorldConfig, find_config, read_config
 from shotenv.render import FrameRenderer
 from shotenv.render.llvm import start_mitsuba
@@ -46,7 +47,7 @@ def _race(world: World, camera: CameraConfig, sensor: SensorConfig) -> dict[str,
         f"pixel, {camera.bounces} bounces; path integrator {1e3 * theirs:.0f} ms for as many rays"
     )
     name = f"render {camera.width} x {camera.height}"
-    return {"name": name, "ratio": ratio, "goal": GOAL, "holds": ratio <= GOAL, "note": note}
+    return row(name, ratio, "<=", GOAL, note)
 
 
 def alternating(

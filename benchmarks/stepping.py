@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from benchmarks.rows import row
 from benchmarks.turns import alternately
 from shotenv.bank.store import write_clip, write_manifest
 from shotenv.core import open_problem, reset, step
@@ -87,13 +88,8 @@ def single(fields: dict[str, object], shots: Shots) -> dict:
         torch.atan2(pixels[0], pixels[1])
 
     step_s, least_s = alternately(play, least, REPEATS)
-    return {
-        "name": f"step, {int(shots)} DCS / normals + atan2",
-        "ratio": step_s / least_s,
-        "goal": 3.0,
-        "holds": step_s <= 3.0 * least_s,
-        "note": f"{1e3 * step_s:.2f} ms against {1e3 * least_s:.2f} ms, 160 x 120, one thread",
-    }
+    note = f"{1e3 * step_s:.2f} ms against {1e3 * least_s:.2f} ms, 160 x 120, one thread"
+    return row(f"step, {int(shots)} DCS / normals + atan2", step_s / least_s, "<=", 3.0, note)
 
 
 def batched(fields: dict[str, object]) -> dict:
@@ -109,10 +105,5 @@ def batched(fields: dict[str, object]) -> dict:
             one.step(actions[action : action + 1])
 
     many_s, one_s = alternately(lambda: many.step(actions), singly, REPEATS // 10)
-    return {
-        "name": f"vector of {DRIVES} / {DRIVES} single steps",
-        "ratio": many_s / one_s,
-        "goal": 1.0,
-        "holds": many_s <= one_s,
-        "note": f"{1e3 * many_s / DRIVES:.2f} ms per step against {1e3 * one_s / DRIVES:.2f} ms",
-    }
+    note = f"{1e3 * many_s / DRIVES:.2f} ms per step against {1e3 * one_s / DRIVES:.2f} ms"
+    return row(f"vector of {DRIVES} / {DRIVES} single steps", many_s / one_s, "<=", 1.0, note)
