@@ -89,3 +89,24 @@ def test_wrap_loss_at_known_errors():
     assert float(wrap_loss(truth, truth, 6.0)) == 0
     # An error of half a range: 1 and 1 / 2, averaged.
     assert float(wrap_loss(truth + 3, truth, 6.0)) == pytest.approx(0.75)
+
+
+def test_unknown_pixels_are_never_the_farthest():
+    truth = torch.full((1, 20, 20), 5.0)
+    truth[:, 0] = 25.0  # unknown, and the farthest were they known
+    known = torch.ones(1, 20, 20, dtype=torch.bool)
+    known[:, 0] = False
+    prediction = torch.full((1, 20, 20), 7.0)
+    assert depth_guided_loss(prediction, truth, known).item() == pytest.approx(4.0)
+    assert depth_guided_loss(prediction, truth).item() == pytest.approx(18.0**2)
+
+
+def test_equation_7_counts_unknown_pixels_as_right():
+    generator = torch.Generator().manual_seed(0)
+    prediction, truth = 30 * torch.rand(2, 2, 24, 24, generator=generator)
+    known = torch.rand(2, 24, 24, generator=generator) < 0.7
+    other = torch.where(known, truth, 30 - truth)
+    one, same = (regression_loss(prediction, t, known=known) for t in (truth, other))
+    assert one.item() == same.item()
+    right = torch.where(known, truth, prediction)
+    assert regression_loss(prediction, right, known=known).item() == pytest.approx(one.item())

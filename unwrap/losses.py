@@ -46,15 +46,17 @@ def scale_invariant_loss(prediction: Tensor, truth: Tensor, mean_share: float = 
     return (squares - mean_share * difference.mean(1).square()).mean()
 
 
-def depth_guided_loss(prediction: Tensor, truth: Tensor) -> Tensor:
+def depth_guided_loss(prediction: Tensor, truth: Tensor, known: Tensor | None = None) -> Tensor:
     """Mean squared difference over the N = (W // 10) (H // 10) farthest true pixels of each image.
 
-    At least one pixel is used.
+    At least one pixel is used. Of pixels that are not `known` (bool [B, H, W]) none is the farthest;
+    where an image has fewer known ones than N, the others count as no difference.
     """
     height, width = truth.shape[-2:]
     count = max(1, (width // 10) * (height // 10))
-    farthest = truth.flatten(1).topk(count, dim=1, sorted=False)
-    return (farthest.values - prediction.flatten(1).gather(1, farthest.indices)).square().mean()
+    ranked = truth if known is None else truth.masked_fill(~known, -torch.inf)
+    places = ranked.flatten(1).topk(count, dim=1, sorted=False).indices
+    return (truth - prediction).flatten(1).gather(1, places).square().mean()
 
 
 def ssim_loss(prediction: Tensor, truth: Tensor, data_range: float = 1.0) -> Tensor:
@@ -94,17 +96,21 @@ def regression_loss(
     range_m: float = 30.0,
     weights: tuple[float, float, float] = EQUATION_7,
     mean_share: float = 1.0,
+    known: Tensor | None = None,
 ) -> Tensor:
     """Eq. 7: 0.5 L_SI + 0.4 L_SSIM + 0.1 L_DG, of depths divided by `range_m`.
 
-    The paper scales depth maps to [0, 1]; `range_m` is the depth that becomes 1.
+    The paper scales depth maps to [0, 1]; `range_m` is the depth that becomes 1. Pixels that are not
+    `known` (bool [B, H, W]) count as predicted rightly.
     """
+    if known is not None:
+        truth_m = torch.where(known, truth_m, prediction_m.detach())
     prediction, truth = prediction_m / range_m, truth_m / range_m
     invariant, similar, guided = weights
     return (
         invariant * scale_invariant_loss(prediction, truth, mean_share)
         + similar * ssim_loss(prediction, truth)
-        + guided * depth_guided_loss(prediction, truth)
+        + guided * depth_guided_loss(prediction, truth, known)
     )
 
 

@@ -188,7 +188,11 @@ class TofRegNet(GrayNetwork):
         """Eq. 7 and our wrap loss; pixels of unknown truth count as right."""
         truth_m = torch.where(truth.known, truth.distance_m, output.detach())
         paper = regression_loss(
-            output, truth_m, range_m=self.settings.range_m, mean_share=weights.mean_share
+            output,
+            truth.distance_m,
+            range_m=self.settings.range_m,
+            mean_share=weights.mean_share,
+            known=truth.known,
         )
         ours = wrap_loss(output, truth_m, self.settings.unambiguous_m)
         return weights.equation_7 * paper + weights.wrap * ours
