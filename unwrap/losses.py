@@ -49,7 +49,7 @@ def scale_invariant_loss(prediction: Tensor, truth: Tensor, mean_share: float = 
 def depth_guided_loss(prediction: Tensor, truth: Tensor, known: Tensor | None = None) -> Tensor:
     """Mean squared difference over the N = (W // 10) (H // 10) farthest true pixels of each image.
 
-    At least one pixel is used. Of pixels that are not `known` (bool [B, H, W]) none is the farthest;
+    At least one pixel is used. Pixels that are not `known` (bool [B, H, W]) are never the farthest;
     where an image has fewer known ones than N, the others count as no difference.
     """
     height, width = truth.shape[-2:]
@@ -100,8 +100,8 @@ def regression_loss(
 ) -> Tensor:
     """Eq. 7: 0.5 L_SI + 0.4 L_SSIM + 0.1 L_DG, of depths divided by `range_m`.
 
-    The paper scales depth maps to [0, 1]; `range_m` is the depth that becomes 1. Pixels that are not
-    `known` (bool [B, H, W]) count as predicted rightly.
+    The paper scales depth maps to [0, 1]; `range_m` is the depth that becomes 1. Pixels that are
+    not `known` (bool [B, H, W]) count as predicted rightly.
     """
     if known is not None:
         truth_m = torch.where(known, truth_m, prediction_m.detach())
