@@ -35,15 +35,14 @@ class BasicBlock(nn.Module):
         self.second = convolution(outputs, outputs, active=False)
         same = stride == 1 and inputs == outputs
         self.shortcut = (
-            nn.Identity()
-            if same
-            else convolution(inputs, outputs, kernel=1, active=False)
+            nn.Identity() if same else convolution(inputs, outputs, kernel=1, active=False)
         )
 
     def forward(self, features: Tensor) -> Tensor:
         """[B, inputs, H, W] -> [B, outputs, H / stride, W / stride]."""
-        # The shortcut's stride is a slice: with AVX2 and few channels, oneDNN 3.12 spoils memory in
-        # the backward pass of strided convolutions of 1 x 1.
+        # The shortcut's stride is a slice: oneDNN 3.12 writes past its workspace when it computes
+        # the weights' gradient of strided 1 x 1 kernels on channels-last inputs that have fewer
+        # channels than a vector has floats (8 with AVX2, 16 with AVX-512).
         kept = features[..., :: self.stride, :: self.stride]
         return functional.relu(self.second(self.first(features)) + self.shortcut(kept))
 
