@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import islice
 from typing import Any, Final
 
 import torch
+from torch import Tensor
 
 from shotenv.bank import Clip, open_bank
 from shotenv.core import Problem
 from shotenv.drive import draw_drive
-from shotenv.measure import acquire_depth, noise_of
+from shotenv.measure import Acquisition, acquire_depth, noise_of
 from shotenv.resolve import env_config
 from shotenv.sensed import SensedFrames
 from unwrap.acquisition import Shots
@@ -73,7 +74,7 @@ def _clip_scores(problem: Problem, clip: Clip) -> list[Scores]:
         scores.append(
             evaluate(
                 {shots: acquisition.raw for shots, acquisition in made.items()},
-                problem.kept.distance_of(frames[step]),
+                _predictions(problem, made),
                 one.truth_m,
                 one.scored > 0,
                 problem.description,
@@ -83,6 +84,15 @@ def _clip_scores(problem: Problem, clip: Clip) -> list[Scores]:
             )
         )
     return scores
+
+
+def _predictions(
+    problem: Problem, made: Mapping[Shots, Acquisition]
+) -> Tensor | dict[Shots, Tensor]:
+    """One prediction for all acquisitions of a frame, or each one's own, made of its samples."""
+    if problem.fusion is None:
+        return made[Shots.EIGHT].predicted_m
+    return {shots: acquisition.predicted_m for shots, acquisition in made.items()}
 
 
 def print_unwrapping(found: dict[str, Any]) -> None:

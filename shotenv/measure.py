@@ -23,8 +23,10 @@ from shotenv.sensor import (
 )
 from unwrap.acquisition import Shots
 from unwrap.correction import correct_and_weigh
+from unwrap.data import GRAY_FULL_SCALE
 from unwrap.frames import DepthFrame, RawFrame
 from unwrap.phase import unambiguous_range_m
+from unwrap.sensed import Sensed
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class Acquisition:
     raw, depth : RawFrame, DepthFrame
         Samples and corrected depth.
     predicted_m, noise_lsb, truth_m : float32 [B, H, W]
-        The network's coarse distance, the sensor's own estimate of a sample's noise, the truth.
+        The network's distance, the sensor's own estimate of a sample's noise, the truth.
     valid, scored : float32 [B, H, W]
         1 where the depth is valid, and where the pixel counts, else 0.
     """
@@ -97,10 +99,10 @@ def acquire_depth(
     if power_w is not None:
         electrons = collect(exposure, sensor, power_w, drive.integration_s)
     raw = acquire(electrons, sensor, shots=shots, noise=noise, offsets=drive.offsets)
-    predicted_m = problem.kept.distance_of(frames)
     noise_lsb = sample_noise_lsb(
         bank.gray(frames), problem.gray_exposure_s.take(frames), drive.integration_s, sensor
     )
+    predicted_m = predict(problem, drive, frames, raw, noise_lsb)
     depth, valid = correct_and_weigh(
         raw,
         predicted_m,
@@ -113,6 +115,26 @@ def acquire_depth(
     )
     scored = scored_pixels(undiminished, exposure.distance_m, problem)
     return Acquisition(raw, depth, valid, predicted_m, noise_lsb, exposure.distance_m, scored)
+
+
+def predict(
+    problem: Problem, drive: Drive, frames: Tensor, raw: RawFrame, noise_lsb: Tensor
+) -> Tensor:
+    """The network's distance float32 [B, H, W] of the bank frames `frames` [B].
+
+    Kept where the gray image is all that it looks at; else made of the samples `raw`, which have
+    the noise `noise_lsb` [B, H, W]. Nothing of the frame before is shown to the network.
+    """
+    if problem.fusion is None:
+        return problem.kept.distance_of(frames)
+    sensed = Sensed(
+        gray=problem.bank.gray(frames).to(torch.float32) / GRAY_FULL_SCALE,
+        raw=raw,
+        offset_lsb=drive.offsets.calibrated_lsb,
+        noise_lsb=noise_lsb,
+        shift_m=drive.drift_m,
+    )
+    return problem.fusion.look(sensed, problem.description).distance_m
 
 
 def scored_pixels(electrons: Electrons, truth_m: Tensor, problem: Problem) -> Tensor:

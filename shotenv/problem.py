@@ -16,7 +16,11 @@ from unwrap.acquisition import harmonic_weights
 from unwrap.calibration import WiggleTable, wiggle_of
 from unwrap.correction import SensorDescription
 from unwrap.frequencies import candidate_spacing_m
-from unwrap.unwrapper import load_unwrapper
+from unwrap.unwrapper import Unwrapper, load_unwrapper
+
+GRAY_NETWORK = "tofregnet"
+"""What is seen of a frame before any sample is taken comes from this network where the chosen one
+needs samples."""
 
 
 @dataclass(frozen=True)
@@ -30,13 +34,17 @@ class Problem:
     clips : tuple of Clip
         Those of the chosen split.
     kept : KeptPredictions
-        The network's predictions for the bank's frames.
+        Predictions from the gray image of each of the bank's frames: the chosen network's, or
+        `GRAY_NETWORK`'s where that one needs samples.
+    fusion : Unwrapper or None
+        The chosen network where it needs samples: it predicts in each acquisition, from what that
+        has brought. None where `kept` is the prediction.
     scenes : Scenes
         What is seen of each frame before any sample is taken.
     gray_exposure_s : float64 [N]
         Exposure time of each frame's gray image.
     network_macs : int
-        Multiply-accumulates of one prediction.
+        Multiply-accumulates of a frame's predictions, by both networks where there are two.
     description : SensorDescription
         What the correction must know of the sensor.
     """
@@ -45,6 +53,7 @@ class Problem:
     bank: Bank
     clips: tuple[Clip, ...]
     kept: KeptPredictions
+    fusion: Unwrapper | None
     scenes: Scenes
     gray_exposure_s: Tensor
     network_macs: int
@@ -66,24 +75,45 @@ def open_problem(config: EnvConfig) -> Problem:
     Raises
     ------
     ValueError
-        The bank or the network is missing or damaged, or the bank was rendered for a sensor with
-        other frequencies or timing.
+        The bank or the network is missing or damaged, the bank was rendered for a sensor with
+        other frequencies or timing, or a network that needs samples was trained for another one.
     """
-    unwrapper = load_unwrapper(config.unwrapper)  # First: a bank may take minutes to render.
+    # Networks first: a bank may take minutes to render.
+    description = describe(config.sensor)
+    gray, fusion = load_networks(config.unwrapper, description)
     bank = open_bank(config.bank)
     check_fits(bank, config.sensor)
     clips = bank.splits(config.split)
-    kept = keep_predictions(bank, unwrapper)
+    kept = keep_predictions(bank, gray)
+    networks = [gray] if fusion is None else [gray, fusion]
     return Problem(
         config=config,
         bank=bank,
         clips=clips,
         kept=kept,
+        fusion=fusion,
         scenes=look_at_scenes(bank, clips, kept, config.sensor),
         gray_exposure_s=torch.from_numpy(bank.gray_exposure_s),
-        network_macs=unwrapper.macs(bank.height, bank.width),
-        description=describe(config.sensor),
+        network_macs=sum(network.macs(bank.height, bank.width) for network in networks),
+        description=description,
     )
+
+
+def load_networks(
+    name_or_path: str, description: SensorDescription
+) -> tuple[Unwrapper, Unwrapper | None]:
+    """The network that looks at the gray image alone, and the one that needs samples, if chosen.
+
+    Raises
+    ------
+    ValueError
+        The network is missing or damaged, or needs samples of another frequency.
+    """
+    unwrapper = load_unwrapper(name_or_path)
+    if unwrapper.network.needs == "gray":
+        return unwrapper, None
+    unwrapper.require_frequency(description)
+    return load_unwrapper(GRAY_NETWORK), unwrapper
 
 
 TRUSTED_SPACING = 0.4

@@ -41,6 +41,19 @@ def test_nearest_bears_a_prediction_2_m_off_where_floor_does_not(scores):
     assert values["8 DCS"]["wrap_accuracy"] == values["8 DCS"]["valid_share"] == 1
 
 
+def test_each_acquisition_may_have_its_own_prediction():
+    truth = torch.linspace(0.5, 5.5, 600, dtype=torch.float64).reshape(1, 20, 30)
+    raws = {shots: raw_frame(truth, int(shots)) for shots in Shots}
+    truth = truth.float()
+    wrong = {Shots.TWO: truth + RANGE_M, Shots.FOUR: truth + 1.0, Shots.EIGHT: truth + 9.0}
+    values = evaluate(raws, wrong, truth, truth > 0, SENSOR)
+    assert "prediction" not in values
+    errors = [values[f"{shots:d} DCS prediction"]["mae_m"] for shots in Shots]
+    assert errors == pytest.approx([RANGE_M, 1.0, 9.0], abs=1e-4)
+    accuracies = [values[f"{n} DCS nearest"]["wrap_accuracy"] for n in (2, 4)]
+    assert accuracies == [0.0, 1.0] and values["8 DCS"]["wrap_accuracy"] == 1.0
+
+
 def test_nothing_scored_gives_nan():
     truth = torch.ones(1, 4, 4)
     raws = {Shots.FOUR: raw_frame(truth, 4)}

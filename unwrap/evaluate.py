@@ -27,7 +27,7 @@ Scores = dict[str, dict[str, float]]
 
 def evaluate(
     raws: Mapping[Shots, RawFrame],
-    predicted_m: Tensor,
+    predicted_m: Tensor | Mapping[Shots, Tensor],
     truth_m: Tensor,
     scored: Tensor,
     sensor: SensorDescription,
@@ -42,8 +42,9 @@ def evaluate(
     ----------
     raws : mapping of Shots to RawFrame
         Acquisitions of the same B frames with 2, 4 or 8 samples; any of them may be missing.
-    predicted_m : float [B, H, W]
-        A network's coarse distance of the same frames.
+    predicted_m : float [B, H, W], or mapping of Shots to such
+        A network's distance of the same frames: from the gray image alone, or of each acquisition
+        by itself, made of its samples.
     truth_m : float [B, H, W]
         True distance, metres.
     scored : bool [B, H, W]
@@ -54,12 +55,18 @@ def evaluate(
     Returns
     -------
     dict of dict
-        By method ("prediction", "2 DCS wrap 0", "4 DCS nearest", "8 DCS", ...) the values of
+        By method ("prediction", or "2 DCS prediction", ... where each acquisition has its own;
+        "2 DCS wrap 0", "4 DCS nearest", "8 DCS", ...) the values of
         `depth_metrics` and `wrap_accuracy`, the share of scored pixels less than half an
         unambiguous range off; for acquisitions also `valid_share` of the scored pixels.
     """
     half_m = unambiguous_range_m(sensor.f1_hz) / 2
-    scores = {"prediction": score(predicted_m, truth_m, scored, half_m)}
+    if isinstance(predicted_m, Tensor):
+        guesses = {"prediction": predicted_m}
+        predicted_m = dict.fromkeys(raws, predicted_m)
+    else:
+        guesses = {f"{shots:d} DCS prediction": own_m for shots, own_m in predicted_m.items()}
+    scores = {name: score(own_m, truth_m, scored, half_m) for name, own_m in guesses.items()}
     for shots, raw in raws.items():
         for name, merge in _methods(shots).items():
             if merge is None:
@@ -68,7 +75,7 @@ def evaluate(
             else:
                 frame = correct(
                     raw,
-                    predicted_m,
+                    predicted_m[shots],
                     sensor,
                     merge=merge,
                     offset_lsb=offset_lsb,
