@@ -128,7 +128,8 @@ class Network(nn.Module):
 def autocast(device: torch.device) -> torch.autocast:
     """bfloat16 arithmetic inside the context where the device is faster with it."""
     if device.type == "cuda":
-        supported = torch.cuda.is_bf16_supported()
+        # Older devices emulate it, which is slower than float32.
+        supported = torch.cuda.is_bf16_supported(including_emulation=False)
     else:
         capabilities: dict = getattr(torch.cpu, "get_capabilities", dict)()
         supported = capabilities.get("avx512_bf16", False)
