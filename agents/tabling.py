@@ -25,8 +25,6 @@ PAGE, NUMBERS, FIGURE = "unwrapping.md", "unwrapping.json", "unwrapping.png"
 TEMPLATE = "unwrapping.md.jinja"
 FULL = TableConfig()
 """The paper's size and length."""
-SHOWN = ("overcast_street", "garage", "night_road")
-"""Families of the frames that the figure shows."""
 
 
 def make_table(
@@ -110,7 +108,7 @@ def _page(config: TableConfig, rows: list[Row]) -> str:
 
 
 def _write_figure(networks: dict[Training, Unwrapper], path: Path) -> None:
-    """Gray networks first, the one that sees the samples last."""
+    """A frame of each family; gray networks first, the one that sees the samples last."""
     shown = {
         training.label: network
         for training, network in networks.items()
@@ -118,7 +116,7 @@ def _write_figure(networks: dict[Training, Unwrapper], path: Path) -> None:
         and training.config.network in ("tofregnet", "tofsegnet", "toffusionnet")
     }
     frames = sources(next(iter(networks)).config)("test")
-    numbers = [frames.families.index(family) for family in SHOWN if family in frames.families]
+    numbers = [frames.families.index(family) for family in dict.fromkeys(frames.families)]
     content = io.BytesIO()
     figure(shown, frames, numbers).save(content, format="PNG", optimize=True)
     write_bytes(path, content.getvalue())
