@@ -74,10 +74,14 @@ def _rows(networks: dict[Training, Unwrapper]) -> list[Row]:
         if (split_by, truth) == ("clip", "rendered"):
             training_frames = sources(config)("train")
             methods += classical_methods(training_frames)
-            if any(clip.split == "shift" for clip in training_frames.bank.clips):
-                rows += _scored(methods, config, "shift", {"split": "shift", "truth": truth})
         rows += _scored(methods, config, "test", {"split": split_by, "truth": truth})
+        if (split_by, truth) == ("clip", "rendered") and _has_held_out(training_frames):
+            rows += _scored(methods, config, "shift", {"split": "shift", "truth": truth})
     return rows
+
+
+def _has_held_out(frames: SensedFrames) -> bool:
+    return any(clip.split == "shift" for clip in frames.bank.clips)
 
 
 def _scored(
