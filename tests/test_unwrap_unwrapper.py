@@ -11,7 +11,7 @@ from unwrap.correction import SensorDescription, correct
 from unwrap.frames import RawFrame
 from unwrap.nets import TofRegNet, TofSegNet
 from unwrap.phase import unambiguous_range_m
-from unwrap.unwrapper import load_unwrapper
+from unwrap.unwrapper import SHIPPED, load_unwrapper
 from unwrap.weights import save_weights
 
 SENSOR = SensorDescription()
@@ -45,6 +45,14 @@ def raw_frame(distance_m, count, amplitude=200.0):
 @pytest.fixture
 def truth():
     return torch.linspace(0.05, 24.95, 2 * 20 * 30, dtype=torch.float64).reshape(2, 20, 30)
+
+
+@pytest.mark.parametrize("name", ["tofregnet", "tofsegnet", "toffusionnet"])
+def test_shipped_networks_are_small_and_say_what_they_are(name):
+    unwrapper = load_unwrapper(name)
+    assert unwrapper.name == name
+    assert (SHIPPED / f"{name}.safetensors").stat().st_size <= 8e6
+    assert unwrapper.metadata["f1_hz"] == 24e6
 
 
 def test_prediction_is_that_of_the_network(path):
