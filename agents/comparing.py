@@ -160,14 +160,14 @@ def rows_of(
         if shots in method.shots
     }
     for number in range(len(frames)):
+        scored = frames.scored([number], draw=JUDGED_DRAW)
         for shots in dict.fromkeys(shots for _, shots in tallies):
             sensed, truth = frames.batch([number], draw=JUDGED_DRAW, shots=shots)
-            scored = frames.scored([number], draw=JUDGED_DRAW) & truth.known
             for (method, its_shots), tally in tallies.items():
                 if its_shots == shots:
                     shown = replace(sensed, memory=tally.memory(method, number))
                     estimate = method.look(shown, frames.sensor)
-                    tally.add(estimate, truth.distance_m, scored)
+                    tally.add(estimate, truth.distance_m, scored & truth.known)
         tick(1)
     return [
         {"method": method.label, "shots": int(shots), "merge": method.merge, **tally.means()}

@@ -5,7 +5,13 @@ import pytest
 import torch
 from PIL import Image
 
-from agents.comparing import Estimate, Method, accuracy_and_precision, rows_of
+from agents.comparing import (
+    Estimate,
+    Method,
+    accuracy_and_precision,
+    classical_methods,
+    rows_of,
+)
 from agents.comparison import TableConfig, trainings
 from agents.tabling import FIGURE, NUMBERS, PAGE, make_table
 from shotenv.bank import open_bank
@@ -118,7 +124,9 @@ def test_an_unknown_network_is_named(tmp_path):
         make_table(TableConfig(), tmp_path, only=["unet"])
 
 
-def test_two_frequencies_leave_a_hole_where_they_disagree(frames):
+def test_two_frequencies_are_judged_without_rejection(frames):
     sensed, _ = frames.batch([0], draw=0, shots=Shots.EIGHT)
-    depth = unwrapped(sensed, None, frames.sensor)
-    assert depth.distance_m.isnan().any()
+    assert unwrapped(sensed, None, frames.sensor).distance_m.isnan().any()
+    (method,) = (m for m in classical_methods(frames) if m.label.startswith("two frequencies"))
+    depth_m = method.look(sensed, frames.sensor).depth_m
+    assert torch.equal(depth_m.isnan(), sensed.raw.saturated)
