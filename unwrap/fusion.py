@@ -7,11 +7,13 @@ noise and all; where a pixel has no usable signal the curve's mean is its distan
 
 The body (`unwrap.nets.Autoencoder`) sees the scene at half resolution. What it finds is judged at
 full resolution by a small last stage, beside the phase and amplitude of each pixel and its
-neighbours.
+neighbours. That stage also gives a vector for each pixel that is added to the unit vector of its
+phase: where noise is strong, the neighbours' phase outweighs the pixel's own.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import ClassVar, Self
@@ -34,10 +36,14 @@ from unwrap.sensed import Memory, Sensed, Truth
 FEATURES = 9
 """Maps that the network sees: three of gray, four of phase, two of memory."""
 HIDDEN = 16
-"""Maps that the body gives to each pixel, and the hidden layer's width."""
+"""Maps that the body gives to each pixel, and the hidden layers' width."""
+VECTOR = 2
+"""Maps of the vector that corrects the phase."""
+LEAST_ALONG = 0.01
+"""Least component along the measured phase; its inverse bounds the gradient."""
 KNOTS_PER_WRAP = 2
 CORRECTION = 0.25
-"""Largest correction of a measured distance, in unambiguous ranges: never into another wrap."""
+"""Largest correction of a measured distance, in unambiguous ranges: a right angle of phase."""
 COARSE_WEIGHT = 0.2
 """Weight of the loss of the whole curve beside that of the wrap candidates."""
 CORRECTION_WEIGHT = 0.5
@@ -73,7 +79,8 @@ class TofFusionNet(Autoencoder):
         super().__init__(settings, FEATURES, HIDDEN)
         self.judge = nn.Sequential(
             convolution(HIDDEN + FEATURES, HIDDEN),
-            nn.Conv2d(HIDDEN, KNOTS_PER_WRAP * settings.classes + 2, 1),
+            convolution(HIDDEN, HIDDEN),
+            nn.Conv2d(HIDDEN, KNOTS_PER_WRAP * settings.classes + 1 + VECTOR, 1),
         )
         self.register_buffer("temperature", torch.ones(2))
 
@@ -83,9 +90,9 @@ class TofFusionNet(Autoencoder):
         return cls(settings)
 
     def forward(self, features: Tensor) -> Tensor:
-        """features [B, FEATURES, H, W] -> [B, knots + 1, H, W], for any H and W.
+        """features [B, FEATURES, H, W] -> [B, knots + VECTOR, H, W], for any H and W.
 
-        The last map is the correction, in units of the largest, before it is bounded.
+        The last maps are what is added to the cosine and sine of the phase, see `correction_rad`.
         """
         height, width = features.shape[-2:]
         padded = pad(features)
@@ -127,8 +134,9 @@ class TofFusionNet(Autoencoder):
         The first and last count pixels with a usable signal, the second all of known truth, at
         `COARSE_WEIGHT`. `weights` are those of other networks.
         """
-        unambiguous_m, (scores, correction_m) = self.settings.unambiguous_m, self.parts(output)
+        unambiguous_m = self.settings.unambiguous_m
         wrapped_m, signal = measured(sensed, sensor)
+        scores, correction_m = self.parts(output, wrapped_m)
         wraps = own_wraps(truth.distance_m, wrapped_m, self.settings)
         counted = truth.known & signal
         candidates = candidate_scores(scores, wrapped_m, unambiguous_m)
@@ -141,10 +149,11 @@ class TofFusionNet(Autoencoder):
         exact = counted & (truth.distance_m < self.settings.range_m)
         return wrap + COARSE_WEIGHT * coarse + CORRECTION_WEIGHT * mean_over(error_m.abs(), exact)
 
-    def parts(self, output: Tensor) -> tuple[Tensor, Tensor]:
+    def parts(self, output: Tensor, wrapped_m: Tensor) -> tuple[Tensor, Tensor]:
         """Scores [B, knots, H, W] and correction [B, H, W], metres, from what `forward` gave."""
-        largest_m = CORRECTION * self.settings.unambiguous_m
-        return output[:, :-1], largest_m * torch.tanh(output[:, -1])
+        scores, vector = output[:, :-VECTOR], output[:, -VECTOR:]
+        turn_m = self.settings.unambiguous_m / math.tau
+        return scores, turn_m * correction_rad(vector, wrapped_m / turn_m)
 
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         """The likeliest candidate, corrected, and the probability that its wrap is right.
@@ -152,8 +161,9 @@ class TofFusionNet(Autoencoder):
         Pixels without a usable signal have the mean of their curve, and as confidence the
         probability of the candidate that lies there.
         """
-        unambiguous_m, (scores, correction_m) = self.settings.unambiguous_m, self.parts(output)
+        unambiguous_m = self.settings.unambiguous_m
         wrapped_m, signal = measured(sensed, sensor)
+        scores, correction_m = self.parts(output, wrapped_m)
         coarse_m = mean_distance_m(scores, unambiguous_m)
         place_m = torch.where(signal, wrapped_m, coarse_m.remainder(unambiguous_m))
         logits = candidate_scores(scores, place_m, unambiguous_m)
@@ -189,7 +199,7 @@ class TofFusionNet(Autoencoder):
         with autocast(sensed.gray.device):
             output = self(self.features(sensed, sensor))
         wrapped_m, signal = measured(sensed, sensor)
-        logits = candidate_scores(self.parts(output)[0], wrapped_m, self.settings.unambiguous_m)
+        logits = candidate_scores(self.parts(output, wrapped_m)[0], wrapped_m, self.settings.unambiguous_m)
         wraps = own_wraps(truth.distance_m, wrapped_m, self.settings)
         told = signal & truth.known & (truth.distance_m < self.settings.range_m)
         step = max(1, int(told.sum()) // CALIBRATION_PIXELS)
@@ -209,6 +219,18 @@ def measured(sensed: Sensed, sensor: SensorDescription) -> tuple[Tensor, Tensor]
     frame = first_phase(sensed, sensor)
     strong = frame.amplitude >= noise_of(sensed, sensor) * sensor.min_snr
     return distance_m(frame.phase_rad, sensor.f1_hz), strong & ~samples_of(sensed).saturated
+
+
+def correction_rad(vector: Tensor, phase_rad: Tensor) -> Tensor:
+    """Angle [B, H, W] from the measured phase to its unit vector plus `vector` [B, 2, H, W].
+
+    Within a right angle either way: along the measured phase the sum is kept at `LEAST_ALONG` or
+    more by a softplus.
+    """
+    cosine, sine = phase_rad.cos(), phase_rad.sin()
+    along = LEAST_ALONG + functional.softplus(1 + cosine * vector[:, 0] + sine * vector[:, 1])
+    across = cosine * vector[:, 1] - sine * vector[:, 0]
+    return (across / along).atan()
 
 
 def candidate_scores(scores: Tensor, wrapped_m: Tensor, unambiguous_m: float) -> Tensor:
