@@ -25,8 +25,8 @@ def move_depth(
     """Depth of a still scene as it is seen after the camera has moved.
 
     Every pixel's point falls onto the nearest pixel of the new view, and the nearer of two points
-    wins. What is behind the camera or outside the view is lost; pixels that no point falls onto are
-    unknown.
+    wins. What is behind the camera or outside the view is lost. Pixels that no point falls onto are
+    unknown, but for holes a pixel wide, which open in surfaces that come nearer: see `bridged`.
 
     Parameters
     ----------
@@ -91,12 +91,23 @@ def moved(points: Tensor, forward_m: Tensor, yaw_rad: Tensor) -> Tensor:
 
 
 def splat(distance_m: Tensor, place: Tensor, seen: Tensor) -> Memory:
-    """The least of the distances [B, H, W] that are `seen` at each flat index `place`."""
+    """The least of the distances [B, H, W] that are `seen` at each flat index `place`; bridged."""
     offered = torch.where(seen, distance_m, torch.inf).flatten(1)
     nearest = torch.full_like(offered, torch.inf)
     nearest = nearest.scatter_reduce(1, place.flatten(1), offered, "amin").view_as(distance_m)
+    for axis in (-1, -2):
+        nearest = bridged(nearest, axis)
     known = nearest.isfinite()
     return Memory(torch.where(known, nearest, 0).float(), known.float())
+
+
+def bridged(distance_m: Tensor, axis: int) -> Tensor:
+    """Distances [B, H, W], where infinite the nearer of both neighbours along `axis`, if known."""
+    beyond = torch.full_like(distance_m.narrow(axis, 0, 1), torch.inf)
+    padded = torch.cat((beyond, distance_m, beyond), axis)
+    before, after = (padded.narrow(axis, at, distance_m.shape[axis]) for at in (0, 2))
+    held = before.isfinite() & after.isfinite() & ~distance_m.isfinite()
+    return torch.where(held, torch.minimum(before, after), distance_m)
 
 
 def _per_frame(value: Tensor | float, like: Tensor) -> Tensor:
