@@ -117,6 +117,7 @@ def _write_figure(networks: dict[Training, Unwrapper], path: Path) -> None:
         training.label: network
         for training, network in networks.items()
         if (training.config.split_by, training.config.truth) == ("clip", "rendered")
+        and not training.wide
         and training.config.network in ("tofregnet", "tofsegnet", "toffusionnet")
     }
     frames = sources(next(iter(networks)).config)("test")
