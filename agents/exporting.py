@@ -10,11 +10,14 @@ from jsonargparse import ArgumentParser, Namespace
 from torch import Tensor
 
 from agents.export_frames import ExportFrames, choose_bank, export_frames
-from agents.onnx_files import OPSET, Exported, quantised, run, run_torch, to_onnx
-from shotenv.config import SensorConfig, find_config, read_config
+from agents.onnx_files import OPSET, exported, quantised, run, run_torch, to_onnx
+from shotenv.config import SensorConfig
 from shotenv.problem import describe
+from shotenv.resolve import env_config
+from unwrap.acquisition import Shots
 from unwrap.correction import Merge
 from unwrap.files import write_bytes
+from unwrap.merge import nearest_wraps
 from unwrap.phase import unambiguous_range_m
 from unwrap.unwrapper import Unwrapper, load_unwrapper
 
@@ -29,6 +32,12 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.onnx")
     parser.add_argument("--height", type=int, default=240, help="pixels down")
     parser.add_argument("--width", type=int, default=320, help="pixels across")
+    parser.add_argument(
+        "--shots",
+        type=int,
+        metavar="N",
+        help="samples of each frame, 2 or 4 (default), for a network that looks at them",
+    )
     parser.add_argument("--sensor", default="epc660", help="name or path of a sensor configuration")
     parser.add_argument("--merge", type=Merge, default="nearest", help="nearest, or floor (eq. 6)")
     parser.add_argument("--int8", action="store_true", help="write FILE.int8.onnx, quantised, too")
@@ -49,13 +58,15 @@ def export_files(arguments: Namespace) -> dict[str, Any]:
         A network, sensor, bank or size that is of no use, or a file that disagrees with torch,
         which is not written then.
     """
-    config = read_config(SensorConfig, find_config("sensor", arguments.sensor))
+    config = env_config(sensor=arguments.sensor)
     unwrapper, size = load_unwrapper(arguments.unwrapper), _size(arguments)
-    exported = Exported(unwrapper, describe(config), arguments.merge).eval()
-    bank = choose_bank(arguments.check_bank, config)
-    frames = export_frames(bank, "test", CHECKED_FRAMES, size, config.f1_hz)
-    content = to_onnx(exported, size, metadata_of(unwrapper, exported, config, size))
-    judge = Judge(frames, config, run_torch(exported, frames))
+    shots = shots_of(unwrapper, arguments.shots)
+    network = exported(unwrapper, describe(config.sensor), arguments.merge)
+    bank = choose_bank(arguments.check_bank, config.sensor)
+    frames = export_frames(bank, "test", CHECKED_FRAMES, size, config, shots)
+    metadata = metadata_of(unwrapper, arguments.merge, config.sensor, size, shots)
+    content = to_onnx(network, frames.one_by_one()[0], metadata)
+    judge = Judge(frames, config.sensor.f1_hz, run_torch(network, frames))
     found: dict[str, Any] = {
         "frames": frames.source,
         "opset": OPSET,
@@ -64,7 +75,7 @@ def export_files(arguments: Namespace) -> dict[str, Any]:
     require_agreement(found["onnx"]["same_wraps"])
     _write(arguments.out, content, found["onnx"])
     if arguments.int8:
-        training = export_frames(bank, "train", CALIBRATION_FRAMES, size, config.f1_hz)
+        training = export_frames(bank, "train", CALIBRATION_FRAMES, size, config, shots)
         small = quantised(content, training)
         found["int8"] = {"calibration": training.source, **judge(run(small, frames))}
         _write(arguments.out.with_suffix(".int8.onnx"), small, found["int8"])
@@ -78,8 +89,30 @@ def _size(arguments: Namespace) -> tuple[int, int]:
     return arguments.height, arguments.width
 
 
+def shots_of(unwrapper: Unwrapper, shots: int | None) -> Shots | None:
+    """Samples that the file takes; None for a network that looks at the gray image alone.
+
+    Raises
+    ------
+    ValueError
+        `shots` are neither two nor four, or asked for of such a network.
+    """
+    if unwrapper.network.needs == "gray":
+        if shots is not None:
+            alone = f"{unwrapper.name} looks at the gray image alone"
+            raise ValueError(f"shots is {shots}; expected none, since {alone}")
+        return None
+    if shots not in (None, Shots.TWO, Shots.FOUR):
+        raise ValueError(f"shots is {shots}; expected 2 or 4")
+    return Shots(shots or Shots.FOUR)
+
+
 def metadata_of(
-    unwrapper: Unwrapper, exported: Exported, sensor: SensorConfig, size: tuple[int, int]
+    unwrapper: Unwrapper,
+    merge: Merge,
+    sensor: SensorConfig,
+    size: tuple[int, int],
+    shots: Shots | None,
 ) -> dict[str, str]:
     """What is stored with the file: where it comes from and what its inputs mean."""
     values = {
@@ -91,11 +124,13 @@ def metadata_of(
         "f1_hz": sensor.f1_hz,
         "unambiguous_m": unambiguous_range_m(sensor.f1_hz),
         "saturation_range_m": sensor.saturation_range_m,
-        "merge": exported.merge,
+        "merge": merge,
         "image_height": size[0],
         "image_width": size[1],
         "every_row_and_column": unwrapper.stride(*size),
     }
+    if shots is not None:
+        values |= {"shots": int(shots), "min_snr": sensor.min_snr}
     return {name: str(value) for name, value in values.items()}
 
 
@@ -105,34 +140,34 @@ class Judge:
     Parameters
     ----------
     frames : ExportFrames
-    sensor : SensorConfig
-        Of it the frequency and the range that is scored.
-    reference : list of Tensor
+    f1_hz : float
+        Modulation frequency that the wraps belong to.
+    reference : dict of str to Tensor
         Torch's outputs.
     """
 
-    def __init__(self, frames: ExportFrames, sensor: SensorConfig, reference: list[Tensor]):
-        self.frames, self.sensor, self.reference = frames, sensor, reference
+    def __init__(self, frames: ExportFrames, f1_hz: float, reference: dict[str, Tensor]):
+        self.frames, self.f1_hz, self.reference = frames, f1_hz, reference
 
-    def __call__(self, outputs: list[Tensor]) -> dict[str, Any]:
+    def __call__(self, outputs: dict[str, Tensor]) -> dict[str, Any]:
         """Shares of equal wraps, differences of the predicted distance, and both accuracies."""
-        apart_m = (outputs[0] - self.reference[0]).abs()
+        wraps, wraps_torch = outputs["wraps"], self.reference["wraps"]
+        apart_m = (outputs["predicted_m"] - self.reference["predicted_m"]).abs()
         return {
-            "same_wraps": (outputs[1] == self.reference[1]).double().mean().item(),
+            "same_wraps": (wraps == wraps_torch).double().mean().item(),
             "mean_difference_m": apart_m.mean().item(),
             "largest_difference_m": apart_m.max().item(),
-            "wrap_accuracy": self._accuracy(outputs[1]),
-            "wrap_accuracy_torch": self._accuracy(self.reference[1]),
+            "wrap_accuracy": self._accuracy(wraps),
+            "wrap_accuracy_torch": self._accuracy(wraps_torch),
         }
 
     def _accuracy(self, wraps: Tensor) -> float | None:
-        """Share of pixels within the range with the true wrap; None without truth."""
-        truth_m = self.frames.truth_m
-        if truth_m is None:
+        """Share of the scored pixels with the right wrap; None without truth."""
+        truth_m, scored = self.frames.truth_m, self.frames.scored
+        if truth_m is None or scored is None:
             return None
-        turns = (truth_m - self.frames.wrapped_m) / unambiguous_range_m(self.sensor.f1_hz)
-        near = truth_m <= self.sensor.max_range_m
-        return (wraps == turns.round())[near].double().mean().item()
+        right = nearest_wraps(truth_m, self.frames.wrapped_m, unambiguous_range_m(self.f1_hz))
+        return (wraps == right)[scored].double().mean().item()
 
 
 def require_agreement(same_wraps: float) -> None:

@@ -16,44 +16,65 @@ from torch import Tensor, nn
 from agents.export_frames import ExportFrames
 from unwrap.correction import MERGES, Merge, SensorDescription
 from unwrap.data import GRAY_FULL_SCALE
+from unwrap.frames import RawFrame
+from unwrap.fusion import measured
+from unwrap.network import Needs, Prediction
 from unwrap.phase import unambiguous_range_m
 from unwrap.sensed import Sensed
-from unwrap.sizes import enlarged, thinned
+from unwrap.sizes import restored, thinned
 from unwrap.unwrapper import Unwrapper
 
-INPUTS = ("gray", "wrapped_m")
-OUTPUTS = ("predicted_m", "wraps", "distance_m")
 OPSET = 20
 
 
 class Exported(nn.Module):
-    """A gray image and a wrapped map to distance: what an ONNX file computes.
+    """What an ONNX file computes: the names of its inputs and outputs are those of `forward`.
 
     Parameters
     ----------
     unwrapper : Unwrapper
-        Of a network that looks at the gray image alone.
     sensor : SensorDescription
     merge : "nearest" or "floor"
 
     Raises
     ------
     ValueError
-        The network needs samples, or was trained for another frequency.
+        The network was trained for another frequency.
     """
 
     def __init__(self, unwrapper: Unwrapper, sensor: SensorDescription, merge: Merge):
         super().__init__()
-        if unwrapper.network.needs != "gray":
-            raise ValueError(
-                f"{unwrapper.name} needs the samples of each frame; expected a network that looks "
-                "at the gray image alone, such as tofregnet or tofsegnet"
-            )
         unwrapper.require_frequency(sensor)
         self.network, self.stride = unwrapper.network, unwrapper.stride
         self.sensor, self.merge = sensor, merge
 
-    def forward(self, gray: Tensor, wrapped_m: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    def look(self, sensed: Sensed) -> Prediction:
+        """The network's prediction for frames, which are thinned for it as `Unwrapper.look` does.
+
+        In float32 wherever it runs, so that a file does not depend on the machine that wrote it.
+        """
+        stride = self.stride(*sensed.gray.shape[-2:])
+        shown = thinned(sensed, stride)
+        output = self.network(self.network.features(shown, self.sensor))
+        prediction = self.network.predict(output, shown, self.sensor)
+        return restored(prediction, sensed, self.sensor, stride, self.network.needs)
+
+    def merged(self, predicted_m: Tensor, wrapped_m: Tensor) -> Tensor:
+        """Wrapped distance with the wraps that the prediction tells, all [1, H, W] in metres."""
+        unambiguous_m = unambiguous_range_m(self.sensor.f1_hz)
+        limit_m = self.sensor.saturation_range_m
+        return MERGES[self.merge](predicted_m, wrapped_m, unambiguous_m, limit_m)
+
+    def wraps(self, distance_m: Tensor, wrapped_m: Tensor) -> Tensor:
+        """Whole unambiguous ranges from `wrapped_m` to `distance_m`, rounded; int32 [1, H, W]."""
+        turns = (distance_m - wrapped_m) / unambiguous_range_m(self.sensor.f1_hz)
+        return turns.round().clamp(min=0).to(torch.int32)
+
+
+class ExportedGray(Exported):
+    """A gray image and a wrapped map to distance, by a network of the gray image alone."""
+
+    def forward(self, gray: Tensor, wrapped_m: Tensor) -> dict[str, Tensor]:
         """Predicted distance, wraps and corrected distance.
 
         Parameters
@@ -69,28 +90,92 @@ class Exported(nn.Module):
             The network's distance; whole unambiguous ranges from `wrapped_m` to `distance_m`,
             rounded; and the two merged.
         """
-        stride = self.stride(*gray.shape[-2:])
-        shown = thinned(Sensed(gray.to(torch.float32) / GRAY_FULL_SCALE), stride)
-        output = self.network(self.network.features(shown, self.sensor))
-        shown_m = self.network.predict(output, shown, self.sensor).distance_m
-        predicted_m = enlarged(shown_m, stride)
-        unambiguous_m = unambiguous_range_m(self.sensor.f1_hz)
-        distance_m = MERGES[self.merge](
-            predicted_m, wrapped_m, unambiguous_m, self.sensor.saturation_range_m
-        )
-        wraps = ((distance_m - wrapped_m) / unambiguous_m).round().clamp(min=0)
-        return predicted_m, wraps.to(torch.int32), distance_m
+        predicted_m = self.look(Sensed(fractions(gray))).distance_m
+        distance_m = self.merged(predicted_m, wrapped_m)
+        return {
+            "predicted_m": predicted_m,
+            "wraps": self.wraps(distance_m, wrapped_m),
+            "distance_m": distance_m,
+        }
 
 
-def to_onnx(exported: Exported, size: tuple[int, int], metadata: Mapping[str, str]) -> bytes:
-    """ONNX file of `exported` for images of `size`, height and width."""
-    gray = torch.zeros(1, *size, dtype=torch.uint16)
+class ExportedSamples(Exported):
+    """A gray image and samples to distance, by a network that looks at both; without memory."""
+
+    def forward(
+        self,
+        gray: Tensor,
+        dcs_lsb: Tensor,
+        saturated: Tensor,
+        offset_lsb: Tensor,
+        noise_lsb: Tensor,
+        shift_m: Tensor,
+    ) -> dict[str, Tensor]:
+        """Predicted distance, wraps, corrected distance, confidence and validity.
+
+        Parameters
+        ----------
+        gray : uint16 [1, H, W]
+            12-bit gray image.
+        dcs_lsb : float32 [1, n, H, W]
+            Two or four samples at f1, finite.
+        saturated : bool [1, H, W]
+        offset_lsb, noise_lsb : float32 [1, H, W]
+            Stored dark offset, and standard deviation of one sample, above 0.
+        shift_m : float32 [1]
+            Added to the wrapped distances, metres; see `unwrap.correction.decode_at`.
+
+        Returns
+        -------
+        predicted_m, wraps, distance_m : float32, int32, float32 [1, H, W]
+            The network's distance; whole unambiguous ranges from the samples' own wrapped distance
+            to `distance_m`, rounded; and what `unwrap.correction.correct` makes of both.
+        confidence, valid : float32, bool [1, H, W]
+            The network's own, and where the signal is strong enough and not saturated.
+        """
+        # The exported arctangent takes minus zero, which rounding gives, for a negative number.
+        dcs_lsb = torch.where(dcs_lsb == 0, 0.0, dcs_lsb)
+        raw = RawFrame(dcs_lsb, saturated)
+        sensed = Sensed(fractions(gray), raw, offset_lsb, noise_lsb, shift_m)
+        prediction = self.look(sensed)
+        predicted_m = prediction.distance_m
+        wrapped_m, valid = measured(sensed, self.sensor)
+        distance_m = self.merged(predicted_m, wrapped_m).where(valid, predicted_m)
+        return {
+            "predicted_m": predicted_m,
+            "wraps": self.wraps(distance_m, wrapped_m),
+            "distance_m": distance_m,
+            "confidence": prediction.confidence,
+            "valid": valid,
+        }
+
+
+EXPORTED: dict[Needs, type[Exported]] = {"gray": ExportedGray, "samples": ExportedSamples}
+"""By what the network looks at."""
+
+
+def exported(unwrapper: Unwrapper, sensor: SensorDescription, merge: Merge) -> Exported:
+    """What the file of a network computes, in evaluation mode; see `Exported`."""
+    return EXPORTED[unwrapper.network.needs](unwrapper, sensor, merge).eval()
+
+
+def fractions(gray: Tensor) -> Tensor:
+    """12-bit gray image in [0, 1], float32."""
+    return gray.to(torch.float32) / GRAY_FULL_SCALE
+
+
+def to_onnx(
+    exported: Exported, example: Mapping[str, Tensor], metadata: Mapping[str, str]
+) -> bytes:
+    """ONNX file of `exported` for frames of the shapes of `example`."""
+    # Run once beforehand: what the sensor's tables keep must not be kept from a trace.
+    outputs = _computed(exported, example)
     with _quiet():
         program = torch.onnx.export(
             exported,
-            (gray, torch.zeros(1, *size)),
-            input_names=INPUTS,
-            output_names=OUTPUTS,
+            kwargs=dict(example),
+            input_names=list(example),
+            output_names=list(outputs),
             opset_version=OPSET,
             dynamo=True,
             verbose=False,
@@ -103,9 +188,9 @@ def to_onnx(exported: Exported, size: tuple[int, int], metadata: Mapping[str, st
 def quantised(content: bytes, frames: ExportFrames) -> bytes:
     """The ONNX file `content` with convolutions in 8 bits, calibrated with `frames`.
 
-    The first convolution, which sees the logarithm of the gray level, and the last, which makes
-    distances or logits, stay float32: they are a small part of the work, and 8 bits there cost most
-    of the accuracy.
+    Those that see the logarithm of the gray level or the phase, and those that make distances or
+    logits (`outer_convolutions`), stay float32: they are a small part of the work, and 8 bits there
+    cost most of the accuracy.
     """
     import onnx
     from onnxruntime.quantization import CalibrationDataReader, quantize_static
@@ -114,15 +199,15 @@ def quantised(content: bytes, frames: ExportFrames) -> bytes:
         """Hands out the frames one by one."""
 
         def __init__(self) -> None:
-            self._inputs = iter(frames.inputs())
+            self._inputs = iter(frames.one_by_one())
 
         def get_next(self) -> dict[str, np.ndarray] | None:
             """Next frame, None after the last."""
-            return next(self._inputs, None)
+            inputs = next(self._inputs, None)
+            return None if inputs is None else _arrays(inputs)
 
     model = onnx.load_from_string(content)
     metadata = {entry.key: entry.value for entry in model.metadata_props}
-    convolutions = [node.name for node in model.graph.node if node.op_type == "Conv"]
     with _quiet(), tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "int8.onnx"
         quantize_static(
@@ -131,34 +216,66 @@ def quantised(content: bytes, frames: ExportFrames) -> bytes:
             Reader(),
             per_channel=True,
             op_types_to_quantize=["Conv"],
-            nodes_to_exclude=[convolutions[0], convolutions[-1]],
+            nodes_to_exclude=outer_convolutions(model.graph),
         )
         return _serialised(onnx.load(path), {**metadata, "quantised": "int8"})
+
+
+def outer_convolutions(graph) -> list[str]:
+    """Convolutions with no other between them and the inputs, or between them and the outputs.
+
+    `graph` is an ONNX graph, whose nodes are in the order of computation.
+    """
+    seen, made = {value.name for value in graph.input}, {value.name for value in graph.output}
+    outer = []
+    for nodes, known, near, far in (
+        (graph.node, seen, "input", "output"),
+        (reversed(graph.node), made, "output", "input"),
+    ):
+        for node in nodes:
+            if known.isdisjoint(getattr(node, near)):
+                continue
+            if node.op_type == "Conv":
+                outer.append(node.name)
+            else:
+                known.update(getattr(node, far))
+    return outer
 
 
 def _serialised(model, metadata: Mapping[str, str]) -> bytes:
     from onnx import checker, helper
 
+    for node in model.graph.node:
+        node.ClearField("metadata_props")  # Lines of source, by where they lie on this machine.
     helper.set_model_props(model, dict(metadata))
     checker.check_model(model)
     return model.SerializeToString()
 
 
-def run(content: bytes, frames: ExportFrames) -> list[Tensor]:
-    """Outputs [N, H, W] of the ONNX file `content`, by onnxruntime on the CPU."""
+def run(content: bytes, frames: ExportFrames) -> dict[str, Tensor]:
+    """Outputs [N, H, W] of the ONNX file `content` by name, by onnxruntime on the CPU."""
     import onnxruntime
 
     session = onnxruntime.InferenceSession(content, providers=["CPUExecutionProvider"])
-    outputs = [session.run(list(OUTPUTS), inputs) for inputs in frames.inputs()]
-    return [torch.from_numpy(np.concatenate(maps)) for maps in zip(*outputs, strict=True)]
+    names = [output.name for output in session.get_outputs()]
+    outputs = [session.run(names, _arrays(inputs)) for inputs in frames.one_by_one()]
+    maps = (torch.from_numpy(np.concatenate(one)) for one in zip(*outputs, strict=True))
+    return dict(zip(names, maps, strict=True))
+
+
+def run_torch(exported: Exported, frames: ExportFrames) -> dict[str, Tensor]:
+    """Outputs [N, H, W] of torch itself by name, in float32."""
+    outputs = [_computed(exported, inputs) for inputs in frames.one_by_one()]
+    return {name: torch.cat([output[name] for output in outputs]) for name in outputs[0]}
 
 
 @torch.inference_mode()
-def run_torch(exported: Exported, frames: ExportFrames) -> list[Tensor]:
-    """Outputs [N, H, W] of torch itself, in float32."""
-    pairs = zip(frames.gray.split(1), frames.wrapped_m.split(1), strict=True)
-    outputs = [exported(gray, wrapped_m) for gray, wrapped_m in pairs]
-    return [torch.cat(maps) for maps in zip(*outputs, strict=True)]
+def _computed(exported: Exported, inputs: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    return exported(**inputs)
+
+
+def _arrays(inputs: Mapping[str, Tensor]) -> dict[str, np.ndarray]:
+    return {name: values.numpy() for name, values in inputs.items()}
 
 
 @contextmanager

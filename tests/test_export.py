@@ -1,6 +1,5 @@
 """`shotenv unwrap export`: ONNX files equal torch, and stand only where they do."""
 
-import dataclasses
 import json
 
 import numpy as np
@@ -12,12 +11,18 @@ import torch
 from agents import exporting
 from agents.cli import main
 from agents.export_frames import choose_bank, export_frames
-from agents.onnx_files import Exported
+from agents.onnx_files import exported, run_torch, to_onnx
+from agents.onnx_files import run as run_content
 from shotenv.bank import BankError, open_bank
-from unwrap.correction import SensorDescription
+from shotenv.problem import describe
+from shotenv.resolve import env_config
+from unwrap.acquisition import Shots
+from unwrap.frames import RawFrame
+from unwrap.inputs import wrapped_distance_m
 from unwrap.merge import merge_nearest, merge_segmentation
 from unwrap.nets import TofSegNet
 from unwrap.network import Settings
+from unwrap.sensed import Sensed, unwrapped
 from unwrap.unwrapper import load_unwrapper
 from unwrap.weights import save_weights
 from unwrap.zoo import build
@@ -38,15 +43,54 @@ def images(count, seed=0):
     return gray, wrapped_m
 
 
-def run(path, gray, wrapped_m):
+def samples(shots, count=2, seed=0):
+    """Gray images with samples of `shots` at all amplitudes, by the names of the inputs."""
+    random = np.random.default_rng(seed)
+    gray, wrapped_m = images(count, seed)
+    amplitude_lsb = 10 ** random.uniform(0, 3, gray.shape)
+    phase_rad = 2 * np.pi * wrapped_m / UNAMBIGUOUS_M
+    words = np.stack([amplitude_lsb * np.cos(phase_rad - k * np.pi / 2) for k in range(shots)], 1)
+    offset_lsb = random.normal(0, 2, gray.shape)
+    # Words of an imager without offset: many are 0, some of them minus 0.
+    offset_lsb[:, :8] = 0
+    words[:, 0, :2] = -0.0
+    words[:, :, 2] = 0
+    return {
+        "gray": gray,
+        "dcs_lsb": (words + offset_lsb[:, None]).round().astype(np.float32),
+        "saturated": random.random(gray.shape) < 0.1,
+        "offset_lsb": offset_lsb.astype(np.float32),
+        "noise_lsb": random.uniform(1, 5, gray.shape).astype(np.float32),
+        "shift_m": random.normal(0, 0.05, count).astype(np.float32),
+    }
+
+
+def sensed_of(inputs):
+    """What the library takes in place of the inputs of a file."""
+    of = {name: torch.from_numpy(values) for name, values in inputs.items()}
+    raw, gray = RawFrame(of["dcs_lsb"], of["saturated"]), of["gray"].float() / 4095
+    return Sensed(gray, raw, of["offset_lsb"], of["noise_lsb"], of["shift_m"])
+
+
+def run(path, **inputs):
     """Outputs by name, each [N, H, W]."""
     session = onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
     frames = [
-        session.run(None, {"gray": gray[i : i + 1], "wrapped_m": wrapped_m[i : i + 1]})
-        for i in range(len(gray))
+        session.run(None, {name: values[i : i + 1] for name, values in inputs.items()})
+        for i in range(len(inputs["gray"]))
     ]
     maps = map(np.concatenate, zip(*frames, strict=True))
     return dict(zip((output.name for output in session.get_outputs()), maps, strict=True))
+
+
+def write_samples_network(path, name="toffusionnet", **metadata):
+    """An untrained network that looks at samples, whose predictions vary from pixel to pixel."""
+    torch.manual_seed(0)
+    network = build(name, Settings(width=4))
+    last = network.judge[-1] if name == "toffusionnet" else network.head
+    last.weight.data.mul_(30.0)
+    save_weights(path, network, {"network": name, "width": 4, "f1_hz": 24e6, **metadata})
+    return path
 
 
 @pytest.fixture(scope="module")
@@ -69,9 +113,26 @@ def segmenting(tmp_path_factory):
     return path
 
 
+@pytest.fixture(scope="module")
+def fusing(tmp_path_factory):
+    """Path of an untrained TofFusionNet."""
+    return write_samples_network(tmp_path_factory.mktemp("weights") / "fusing.safetensors")
+
+
+@pytest.fixture(scope="module")
+def fused(tmp_path_factory, tiny_bank, fusing):
+    """Folder of its files: 2.onnx, 4.onnx, 4.int8.onnx, numbers.json."""
+    folder = tmp_path_factory.mktemp("onnx")
+    words = ("--int8", "--check-bank", tiny_bank, "--json", folder / "numbers.json")
+    assert export(fusing, "--out", folder / "4.onnx", *words) == 0
+    few = ("--shots", "2", "--check-bank", "none")
+    assert export(fusing, "--out", folder / "2.onnx", *few) == 0
+    return folder
+
+
 def test_onnx_equals_the_unwrapper_and_the_merge(written, tiny_unwrapper):
     gray, wrapped_m = images(3)
-    found = run(written / "net.onnx", gray, wrapped_m)
+    found = run(written / "net.onnx", gray=gray, wrapped_m=wrapped_m)
     predicted_m = load_unwrapper(tiny_unwrapper).predict(torch.from_numpy(gray)).distance_m
     expected_m = merge_nearest(predicted_m, torch.from_numpy(wrapped_m), UNAMBIGUOUS_M, 6.2)
     np.testing.assert_allclose(found["predicted_m"], predicted_m.numpy(), atol=2e-2)
@@ -88,7 +149,7 @@ def test_the_floor_merge_of_classes_is_equation_8(tmp_path, segmenting):
     assert export(segmenting, "--out", path, "--merge", "floor", "--check-bank", "none") == 0
     gray, wrapped_m = images(2)
     wrapped_m = wrapped_m.clip(0, 6.1)
-    found = run(path, gray, wrapped_m)
+    found = run(path, gray=gray, wrapped_m=wrapped_m)
     with torch.inference_mode():
         fractions = torch.from_numpy(gray).float()[:, None] / 4095
         classes = load_unwrapper(segmenting).network(fractions).argmax(1)
@@ -104,13 +165,65 @@ def test_a_large_frame_is_thinned_inside_the_file(tmp_path, segmenting):
     save_weights(path, unwrapper.network, {**unwrapper.metadata, **small})
     assert export(path, "--out", tmp_path / "small.onnx", "--check-bank", "none") == 0
     gray, wrapped_m = images(2)
-    found = run(tmp_path / "small.onnx", gray, wrapped_m)
+    found = run(tmp_path / "small.onnx", gray=gray, wrapped_m=wrapped_m)
     predicted_m = load_unwrapper(path).predict(torch.from_numpy(gray)).distance_m.numpy()
     assert (np.abs(found["predicted_m"] - predicted_m) < 1e-2).mean() > 0.999
     seen = unwrapper.predict(torch.from_numpy(gray[:, ::2, ::2].copy())).distance_m.numpy()
     assert (np.abs(found["predicted_m"][:, ::2, ::2] - seen) < 1e-2).mean() > 0.999
     told = onnxruntime.InferenceSession(tmp_path / "small.onnx").get_modelmeta()
     assert told.custom_metadata_map["every_row_and_column"] == "2"
+
+
+@pytest.mark.parametrize("shots", [2, 4])
+def test_samples_become_what_the_unwrapper_and_the_correction_make_of_them(
+    fused, fusing, sensor, shots
+):
+    inputs, description = samples(shots), describe(sensor)
+    found, sensed = run(fused / f"{shots}.onnx", **inputs), sensed_of(inputs)
+    looked = load_unwrapper(fusing).look(sensed, description)
+    depth = unwrapped(sensed, looked.distance_m, description)
+    np.testing.assert_array_equal(found["valid"], depth.valid.numpy())
+    assert 0.5 < found["valid"].mean() < 0.95
+    for name, expected in (
+        ("predicted_m", looked.distance_m),
+        ("distance_m", depth.distance_m),
+        ("confidence", looked.confidence),
+    ):
+        assert (np.abs(found[name] - expected.numpy()) < 1e-3).mean() > 0.999, name
+    wrapped_m = wrapped_distance_m(sensed, description).numpy()
+    kept = found["valid"] & (wrapped_m < 6.2)
+    rebuilt_m = wrapped_m + UNAMBIGUOUS_M * found["wraps"]
+    assert (np.abs(rebuilt_m - found["distance_m"])[kept] < 1e-3).mean() > 0.999
+    assert len(np.unique(found["wraps"][kept])) > 2
+
+
+def test_a_large_frame_of_samples_is_thinned_inside_the_file(tmp_path, sensor):
+    small = {"trained_height": HEIGHT // 2, "trained_width": WIDTH // 2}
+    path = write_samples_network(tmp_path / "small.safetensors", **small)
+    assert export(path, "--out", tmp_path / "small.onnx", "--check-bank", "none") == 0
+    inputs, unwrapper = samples(4), load_unwrapper(path)
+    found, sensed = run(tmp_path / "small.onnx", **inputs), sensed_of(inputs)
+    looked = unwrapper.look(sensed, describe(sensor))
+    for name, expected in (("predicted_m", looked.distance_m), ("confidence", looked.confidence)):
+        assert (np.abs(found[name] - expected.numpy()) < 1e-3).mean() > 0.999, name
+    wraps = found["predicted_m"] - wrapped_distance_m(sensed, describe(sensor)).numpy()
+    wraps = wraps[found["valid"]] / UNAMBIGUOUS_M
+    assert np.abs(wraps - wraps.round()).max() < 1e-3
+    told = onnxruntime.InferenceSession(tmp_path / "small.onnx").get_modelmeta()
+    assert told.custom_metadata_map["every_row_and_column"] == "2"
+
+
+@pytest.mark.parametrize("name", ["su_net", "phasenet", "agresti_net", "chen_net"])
+def test_peers_that_look_at_samples_serve_as_well(tmp_path, sensor, name):
+    unwrapper = load_unwrapper(write_samples_network(tmp_path / "peer.safetensors", name))
+    network = exported(unwrapper, describe(sensor), "nearest")
+    frames = export_frames(None, "test", 2, (HEIGHT, WIDTH), env_config(), Shots.TWO)
+    content = to_onnx(network, frames.one_by_one()[0], {})
+    found, expected = run_content(content, frames), run_torch(network, frames)
+    assert list(found) == list(expected)
+    assert (found["wraps"] == expected["wraps"]).float().mean() > 0.999
+    assert len(found["wraps"].unique()) > 1
+    assert ((found["predicted_m"] - expected["predicted_m"]).abs() < 1e-2).float().mean() > 0.999
 
 
 @pytest.mark.parametrize("name", ["net.onnx", "net.int8.onnx"])
@@ -132,6 +245,46 @@ def test_files_tell_their_inputs_and_where_they_come_from(written, tiny_unwrappe
     assert told["shotenv_version"] and ("quantised" in told) == ("int8" in name)
 
 
+@pytest.mark.parametrize("name", ["2.onnx", "4.onnx", "4.int8.onnx"])
+def test_files_of_samples_tell_their_inputs_and_how_many_samples(fused, name):
+    session = onnxruntime.InferenceSession(fused / name, providers=["CPUExecutionProvider"])
+    shots, maps = int(name[0]), [1, HEIGHT, WIDTH]
+    assert [(i.name, i.type, i.shape) for i in session.get_inputs()] == [
+        ("gray", "tensor(uint16)", maps),
+        ("dcs_lsb", "tensor(float)", [1, shots, HEIGHT, WIDTH]),
+        ("saturated", "tensor(bool)", maps),
+        ("offset_lsb", "tensor(float)", maps),
+        ("noise_lsb", "tensor(float)", maps),
+        ("shift_m", "tensor(float)", [1]),
+    ]
+    assert [(o.name, o.type, o.shape) for o in session.get_outputs()] == [
+        ("predicted_m", "tensor(float)", maps),
+        ("wraps", "tensor(int32)", maps),
+        ("distance_m", "tensor(float)", maps),
+        ("confidence", "tensor(float)", maps),
+        ("valid", "tensor(bool)", maps),
+    ]
+    told = session.get_modelmeta().custom_metadata_map
+    assert told["network"] == "toffusionnet" and told["shots"] == str(shots)
+    assert float(told["min_snr"]) == 1.0 and ("quantised" in told) == ("int8" in name)
+
+
+@pytest.mark.parametrize(
+    ("folder", "name", "outer"), [("written", "net.int8.onnx", 2), ("fused", "4.int8.onnx", 3)]
+)
+def test_convolutions_at_the_inputs_and_outputs_are_not_quantised(request, folder, name, outer):
+    graph = onnx.load(request.getfixturevalue(folder) / name).graph
+    makers = {made: node.op_type for node in graph.node for made in node.output}
+    sources = [makers.get(node.input[0]) for node in graph.node if node.op_type == "Conv"]
+    assert len(sources) - sources.count("DequantizeLinear") == outer
+    assert sources.count("DequantizeLinear") > 15
+
+
+def test_files_hold_no_path_of_the_machine(written, fused):
+    for path in (*written.glob("*.onnx"), *fused.glob("*.onnx")):
+        assert b"onnx_files.py" not in path.read_bytes(), path
+
+
 def test_weights_are_float32_and_quantised_ones_8_bits(written):
     def types(name):
         graph = onnx.load(written / name).graph
@@ -148,9 +301,12 @@ def test_the_numbers_are_those_of_the_files(written, tiny_bank):
     small = numbers["int8"]
     assert small["calibration"] == "24 train frames of bank tiny"
     assert small["bytes"] == (written / "net.int8.onnx").stat().st_size
-    frames = export_frames(open_bank(tiny_bank), "test", 16, (HEIGHT, WIDTH), 24e6)
-    gray, wrapped_m = frames.gray.numpy(), frames.wrapped_m.numpy()
-    wraps = {n: run(written / n, gray, wrapped_m)["wraps"] for n in ("net.onnx", "net.int8.onnx")}
+    frames = export_frames(open_bank(tiny_bank), "test", 16, (HEIGHT, WIDTH), env_config())
+    gray, wrapped_m = frames.inputs["gray"].numpy(), frames.wrapped_m.numpy()
+    wraps = {
+        n: run(written / n, gray=gray, wrapped_m=wrapped_m)["wraps"]
+        for n in ("net.onnx", "net.int8.onnx")
+    }
     same = (wraps["net.onnx"] == wraps["net.int8.onnx"]).mean()
     assert small["same_wraps"] == pytest.approx(same, abs=2e-3)
     truth_m = frames.truth_m.numpy()
@@ -159,11 +315,42 @@ def test_the_numbers_are_those_of_the_files(written, tiny_bank):
     assert numbers["onnx"]["wrap_accuracy"] == pytest.approx(right.mean(), abs=0.02)
 
 
+def test_the_numbers_of_samples_are_those_of_the_files(fused, tiny_bank):
+    numbers = json.loads((fused / "numbers.json").read_text())
+    assert numbers["frames"] == "16 test frames of bank tiny, 4 samples each"
+    assert numbers["int8"]["calibration"] == "24 train frames of bank tiny, 4 samples each"
+    assert numbers["onnx"]["same_wraps"] > 0.999 and 0.5 < numbers["int8"]["same_wraps"] < 1
+    frames = export_frames(
+        open_bank(tiny_bank), "test", 16, (HEIGHT, WIDTH), env_config(), Shots.FOUR
+    )
+    inputs = {name: values.numpy() for name, values in frames.inputs.items()}
+    for key, name in (("onnx", "4.onnx"), ("int8", "4.int8.onnx")):
+        distance_m, valid = (run(fused / name, **inputs)[what] for what in ("distance_m", "valid"))
+        error_m = np.abs(distance_m - frames.truth_m.numpy())
+        # A wrap is right where the distance is nearest to the truth.
+        right = (error_m < UNAMBIGUOUS_M / 2)[frames.scored.numpy() & valid]
+        assert numbers[key]["wrap_accuracy"] == pytest.approx(right.mean(), abs=0.03)
+    assert numbers["int8"]["wrap_accuracy_torch"] == numbers["onnx"]["wrap_accuracy_torch"]
+
+
+def test_frames_of_a_bank_with_samples_have_noise_and_know_their_wraps(tiny_bank):
+    bank = open_bank(tiny_bank)
+    frames = export_frames(bank, "test", 4, (HEIGHT, WIDTH), env_config(), Shots.TWO)
+    shapes = {name: tuple(values.shape) for name, values in frames.inputs.items()}
+    assert shapes["dcs_lsb"] == (4, 2, HEIGHT, WIDTH) and shapes["shift_m"] == (4,)
+    assert shapes["noise_lsb"] == shapes["saturated"] == frames.truth_m.shape
+    scored = frames.scored
+    assert 0.2 < scored.float().mean() < 1 and frames.truth_m[scored].max() <= 25.0
+    turns = ((frames.truth_m - frames.wrapped_m) / UNAMBIGUOUS_M)[scored]
+    apart_m = (turns - turns.round()).abs() * UNAMBIGUOUS_M
+    assert 1e-3 < apart_m.median() < 0.3
+
+
 def test_frames_of_a_bank_are_scaled_to_the_size(tiny_bank):
     bank = open_bank(tiny_bank)
-    frames = export_frames(bank, "test", 4, (HEIGHT, WIDTH), 24e6)
+    frames = export_frames(bank, "test", 4, (HEIGHT, WIDTH), env_config())
     first = int(bank.frames("test")[0])
-    assert torch.equal(frames.gray[0, ::2, 1::2].int(), bank.frame(first).gray.int())
+    assert torch.equal(frames.inputs["gray"][0, ::2, 1::2].int(), bank.frame(first).gray.int())
     truth_m = frames.truth_m[0]
     known = truth_m.isfinite()
     turns = (truth_m - frames.wrapped_m[0])[known] / UNAMBIGUOUS_M
@@ -172,13 +359,27 @@ def test_frames_of_a_bank_are_scaled_to_the_size(tiny_bank):
 
 
 def test_made_up_images_are_pinned_and_differ_between_splits():
-    made = [export_frames(None, s, 2, (24, 40), 24e6) for s in ("test", "test", "train")]
-    assert torch.equal(made[0].gray, made[1].gray) and not torch.equal(made[0].gray, made[2].gray)
-    assert made[0].gray.shape == (2, 24, 40) and made[0].gray.dtype == torch.uint16
-    gray = made[0].gray.float()
+    made = [export_frames(None, s, 2, (24, 40), env_config()) for s in ("test", "test", "train")]
+    grays = [frames.inputs["gray"] for frames in made]
+    assert torch.equal(grays[0], grays[1]) and not torch.equal(grays[0], grays[2])
+    assert grays[0].shape == (2, 24, 40) and grays[0].dtype == torch.uint16
+    gray = grays[0].float()
     assert gray.max() <= 4095 and gray.std() > 300
     assert made[0].wrapped_m.min() >= 0 and made[0].wrapped_m.max() < UNAMBIGUOUS_M
     assert made[0].truth_m is None and "made-up" in made[0].source
+
+
+def test_made_up_samples_tell_the_made_up_distance():
+    size, config = (HEIGHT, WIDTH), env_config(sensor={"harmonic_strength": 0.0})
+    still = export_frames(None, "test", 2, size, config)
+    frames = export_frames(None, "test", 2, size, config, Shots.FOUR)
+    assert torch.equal(frames.inputs["gray"], still.inputs["gray"])
+    saturated, words = frames.inputs["saturated"], frames.inputs["dcs_lsb"]
+    assert 0 < saturated.float().mean() < 0.2
+    assert torch.equal(words, words.round()) and words.abs().max() <= 2047
+    apart_m = frames.wrapped_m - frames.inputs["shift_m"][:, None, None] - still.wrapped_m
+    apart_m -= UNAMBIGUOUS_M * (apart_m / UNAMBIGUOUS_M).round()
+    assert apart_m[~saturated].abs().median() < 0.1
 
 
 def test_which_bank_is_chosen(sensor, tiny_bank):
@@ -196,8 +397,8 @@ def test_an_export_that_disagrees_is_refused_and_leaves_no_file(
 
     def other_wraps(found, frames):
         assert found == content
-        predicted_m = torch.zeros(frames.gray.shape)
-        return [predicted_m, predicted_m.int() + 9, predicted_m]
+        predicted_m = torch.zeros(frames.wrapped_m.shape)
+        return {"predicted_m": predicted_m, "wraps": predicted_m.int() + 9}
 
     monkeypatch.setattr(exporting, "to_onnx", lambda *_: content)
     monkeypatch.setattr(exporting, "run", other_wraps)
@@ -207,23 +408,34 @@ def test_an_export_that_disagrees_is_refused_and_leaves_no_file(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_networks_that_need_samples_are_refused(segmenting):
-    network = build("toffusionnet", Settings(width=4))
-    unwrapper = dataclasses.replace(load_unwrapper(segmenting), name="fusing", network=network)
-    with pytest.raises(ValueError, match="fusing needs the samples"):
-        Exported(unwrapper, SensorDescription(), "nearest")
-
-
 @pytest.mark.parametrize(
     ("words", "says"),
     [
         (("--sensor", "mlx75027"), "f1_hz is 6e+07; tofsegnet was trained for 2.4e+07"),
         (("--check-bank", "/no/bank"), "/no/bank"),
         (("--height", "8"), "height is 8"),
+        (("--shots", "2"), "shots is 2; expected none, since tofsegnet looks at the gray image"),
     ],
 )
 def test_what_does_not_fit_is_one_sentence(capsys, tmp_path, segmenting, words, says):
+    refused(capsys, tmp_path, segmenting, words, says)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--sensor", "mlx75027"), "f1_hz is 6e+07; toffusionnet was trained for 2.4e+07"),
+        (("--shots", "8"), "shots is 8; expected 2 or 4"),
+        (("--shots", "0"), "shots is 0; expected 2 or 4"),
+    ],
+)
+def test_what_does_not_fit_samples_is_one_sentence(capsys, tmp_path, fusing, words, says):
+    refused(capsys, tmp_path, fusing, words, says)
+
+
+def refused(capsys, tmp_path, network, words, says):
+    """The command fails with one sentence and leaves no file."""
     out = tmp_path / "a.onnx"
-    assert main(["unwrap", "export", str(segmenting), "--out", str(out), *words]) == 1
+    assert main(["unwrap", "export", str(network), "--out", str(out), *words]) == 1
     err = capsys.readouterr().err
     assert says in err and err.count("\n") == 1 and not out.exists()

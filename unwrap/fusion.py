@@ -271,10 +271,11 @@ def knot_entropy(scores: Tensor, distance_m: Tensor, unambiguous_m: float) -> Te
 
 def mean_distance_m(scores: Tensor, unambiguous_m: float) -> Tensor:
     """Mean [B, H, W] of the knots' distances under their softmax, metres."""
-    knots_m = torch.arange(scores.shape[1]).to(scores) * (unambiguous_m / KNOTS_PER_WRAP)
+    apart_m, knots = unambiguous_m / KNOTS_PER_WRAP, scores.shape[1]
+    knots_m = torch.arange(knots).to(scores) * apart_m
     mean_m = torch.einsum("bkhw,k->bhw", scores.softmax(1), knots_m)
     # The end itself would be in a wrap beyond the last.
-    return mean_m.clamp(max=float(knots_m[-1]) * (1 - 1e-6))
+    return mean_m.clamp(max=(knots - 1) * apart_m * (1 - 1e-6))
 
 
 def mean_over(values: Tensor, counted: Tensor) -> Tensor:

@@ -99,6 +99,8 @@ def _check(dcs: Tensor) -> None:
         raise ValueError(f"dcs is {dcs.dtype}; expected a floating-point tensor")
     if dcs.ndim < 3 or dcs.shape[-3] not in (2, 4):
         raise ValueError(f"dcs has shape {tuple(dcs.shape)}; expected [..., 2 or 4, H, W]")
+    if torch.compiler.is_compiling():
+        return  # A graph, such as an exported one, is made before there are values.
     # A sum is one pass and is finite unless a sample is not (or samples are absurdly large).
     if not math.isfinite(dcs.sum()):
         for name, wrong in (("NaN", dcs.isnan()), ("an infinity", dcs.isinf())):

@@ -84,4 +84,4 @@ class AgrestiNet(Network):
 
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         """The distance, in 0..range_m; its confidence: agreement with the phase, see `judged`."""
-        return judged(output.clamp(0, self.settings.range_m), sensed, sensor)
+        return judged(output.clamp(0.0, self.settings.range_m), sensed, sensor)
