@@ -203,7 +203,7 @@ def _made_up(
         wrapped_m = distance.remainder(unambiguous_range_m(sensor.f1_hz))
         return ExportFrames(source, {"gray": gray, "wrapped_m": wrapped_m}, wrapped_m)
     phase_rad = distance * (TWO_PI / unambiguous_range_m(sensor.f1_hz))
-    strength = torch.sigmoid(2.0 * _clouds(count, size, generator) - 3.0)
+    strength = torch.sigmoid(2.0 * _clouds(count, size, generator) - 2.0)
     sensed = _made_up_samples(gray, phase_rad, strength, shots, generator)
     described = describe(sensor)
     return ExportFrames(
@@ -223,7 +223,7 @@ def _made_up_samples(
     sines = correlation_samples(phase_rad, ((1, 1.0),))[:shots].movedim(0, 1)
     noise = torch.randn(sines.shape, generator=generator)
     # The strongest leave the converter's range.
-    light = 1.2 * LARGEST_WORD * strength.unsqueeze(1) * sines
+    light = 1.5 * LARGEST_WORD * strength.unsqueeze(1) * sines
     words = (light + noise_lsb.unsqueeze(1) * noise + offset_lsb.unsqueeze(1)).round()
     return Sensed(
         gray=fractions,

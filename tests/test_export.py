@@ -88,7 +88,8 @@ def write_samples_network(path, name="toffusionnet", **metadata):
     torch.manual_seed(0)
     network = build(name, Settings(width=4))
     last = network.judge[-1] if name == "toffusionnet" else network.head
-    last.weight.data.mul_(30.0)
+    last.weight.data.mul_(30.0 if name == "toffusionnet" else 1000.0)
+    last.bias.data.zero_()
     save_weights(path, network, {"network": name, "width": 4, "f1_hz": 24e6, **metadata})
     return path
 

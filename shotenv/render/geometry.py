@@ -63,9 +63,9 @@ def rotation(pose: Pose) -> np.ndarray:
 
 def geometry_at(world: World, times_s: Sequence[float], bounces: int) -> Geometry:
     """Triangles of `world` at `times_s` for light paths of at most `bounces` surface hits."""
-    moving = np.stack([_posed(world, t) for t in times_s])
-    radius = np.abs(moving[..., :2] - np.asarray(world.ego.at(times_s[0]).position_m[:2])).max()
-    tile = tile_grid(len(times_s), spacing_m=radius + (bounces + 1) * REACH_M)
+    moving = _posed(world, times_s)
+    radius_m = _reach_from(world.ego.at(times_s[0]), moving)
+    tile = tile_grid(len(times_s), spacing_m=radius_m + (bounces + 1) * REACH_M)
     meshes = [world.static, *(thing.mesh for thing in world.moving), *_padding(world)]
     clear = np.concatenate([mesh.clear for mesh in meshes]) > 0
     still, moves = np.split(clear, [len(world.static.corners)])
@@ -82,6 +82,16 @@ def geometry_at(world: World, times_s: Sequence[float], bounces: int) -> Geometr
     )
 
 
+def _reach_from(eye: Pose, corners: np.ndarray) -> float:
+    """Largest distance along x or y from the eye to corners [..., 3], metres."""
+    # One column at a time: NumPy reduces short last axes slowly.
+    columns = (corners[..., axis] for axis in (0, 1))
+    ends = ((column.min(), column.max()) for column in columns)
+    return max(
+        max(high - at, at - low) for (low, high), at in zip(ends, eye.position_m, strict=False)
+    )
+
+
 def tile_grid(count: int, spacing_m: float) -> np.ndarray:
     """Offsets [count, 3] on a square grid about the origin, metres; spacing in whole metres."""
     side = math.ceil(math.sqrt(count))
@@ -90,16 +100,22 @@ def tile_grid(count: int, spacing_m: float) -> np.ndarray:
     return offsets * math.ceil(spacing_m)
 
 
-def _posed(world: World, time_s: float) -> np.ndarray:
-    """Corners [M, 3, 3] of everything that moves, float64, at `time_s`; M is at least one."""
-    parts = [_place(thing.mesh.corners, thing.motion.at(time_s)) for thing in world.moving]
-    parts += [mesh.corners.astype(float) for mesh in _padding(world)]
-    return np.concatenate(parts)
+def _posed(world: World, times_s: Sequence[float]) -> np.ndarray:
+    """Corners [T, M, 3, 3] of everything that moves, float64, at `times_s`; M is at least one."""
+    parts = [
+        _placed(thing.mesh.corners, [thing.motion.at(t) for t in times_s]) for thing in world.moving
+    ]
+    still = Pose((0.0, 0.0, 0.0))
+    parts += [_placed(mesh.corners, [still] * len(times_s)) for mesh in _padding(world)]
+    return np.concatenate(parts, axis=1)
 
 
-def _place(corners: np.ndarray, pose: Pose) -> np.ndarray:
-    points = corners.reshape(-1, 3).astype(float) @ rotation(pose).T + pose.position_m
-    return points.reshape(-1, 3, 3)
+def _placed(corners: np.ndarray, poses: Sequence[Pose]) -> np.ndarray:
+    """Corners [M, 3, 3] in each of T poses, [T, M, 3, 3]."""
+    turns = np.stack([rotation(pose).T for pose in poses])
+    points = corners.reshape(-1, 3).astype(float) @ turns
+    points += np.array([pose.position_m for pose in poses])[:, None]
+    return points.reshape(len(poses), -1, 3, 3)
 
 
 def _padding(world: World) -> list[Mesh]:
@@ -114,12 +130,13 @@ def _padding(world: World) -> list[Mesh]:
 
 
 def _normals(corners: np.ndarray) -> np.ndarray:
-    # np.cross is several times slower on so many triangles.
-    (ax, ay, az), (bx, by, bz) = ((corners[:, i] - corners[:, 0]).T for i in (1, 2))
-    normal = np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    unit = normal / np.where(length > 0, length, 1.0)
-    return np.pad(unit, ((0, 0), (0, 1))).astype(np.float32)
+    # np.cross and sums over a short last axis are several times slower on so many triangles.
+    (ax, ay, az), (bx, by, bz) = ((corners[:, i] - corners[:, 0]).T.copy() for i in (1, 2))
+    normal = np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+    length = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
+    unit = np.zeros((len(corners), 4), np.float32)
+    unit[:, :3] = (normal / np.where(length > 0, length, 1.0)).T
+    return unit
 
 
 def _surface(mesh: Mesh) -> np.ndarray:
