@@ -51,13 +51,15 @@ def samples(shots, count=2, seed=0):
     phase_rad = 2 * np.pi * wrapped_m / UNAMBIGUOUS_M
     words = np.stack([amplitude_lsb * np.cos(phase_rad - k * np.pi / 2) for k in range(shots)], 1)
     offset_lsb = random.normal(0, 2, gray.shape)
-    # Words of an imager without offset: many are 0, some of them minus 0.
     offset_lsb[:, :8] = 0
-    words[:, 0, :2] = -0.0
-    words[:, :, 2] = 0
+    dcs_lsb = (words + offset_lsb[:, None]).round().astype(np.float32)
+    # Rows of a cosine that is minus 0, as rounding gives it, and of no light at all.
+    dcs_lsb[:, :2, :2] = [[[-0.0]], [[50.0]]]
+    dcs_lsb[:, 2:, :2] = 0.0
+    dcs_lsb[:, :, 2] = 0.0
     return {
         "gray": gray,
-        "dcs_lsb": (words + offset_lsb[:, None]).round().astype(np.float32),
+        "dcs_lsb": dcs_lsb,
         "saturated": random.random(gray.shape) < 0.1,
         "offset_lsb": offset_lsb.astype(np.float32),
         "noise_lsb": random.uniform(1, 5, gray.shape).astype(np.float32),
