@@ -1,6 +1,8 @@
 """`shotenv unwrap export`: ONNX files equal torch, and stand only where they do."""
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import onnx
@@ -27,6 +29,7 @@ from unwrap.unwrapper import load_unwrapper
 from unwrap.weights import save_weights
 from unwrap.zoo import build
 
+PAGE = Path(__file__).parents[1] / "docs" / "correct_and_export.md"
 HEIGHT, WIDTH = 48, 64
 UNAMBIGUOUS_M = 299_792_458.0 / 48e6
 
@@ -175,6 +178,18 @@ def test_a_large_frame_is_thinned_inside_the_file(tmp_path, segmenting):
     assert (np.abs(found["predicted_m"][:, ::2, ::2] - seen) < 1e-2).mean() > 0.999
     told = onnxruntime.InferenceSession(tmp_path / "small.onnx").get_modelmeta()
     assert told.custom_metadata_map["every_row_and_column"] == "2"
+
+
+def test_the_pages_example_runs(capsys, monkeypatch, tmp_path, fused):
+    inputs = samples(4, count=1)
+    words = (inputs["dcs_lsb"][0] + 2048).astype(np.uint16)
+    np.savez(
+        tmp_path / "frame.npz", dcs=words, gray=inputs["gray"][0], saturated=inputs["saturated"][0]
+    )
+    example = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[-1]
+    monkeypatch.chdir(tmp_path)
+    exec(example.replace("toffusionnet.onnx", str(fused / "4.onnx")), {})
+    assert re.search(r"median \d+\.\d\d m", capsys.readouterr().out)
 
 
 @pytest.mark.parametrize("shots", [2, 4])
