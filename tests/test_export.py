@@ -120,19 +120,19 @@ def segmenting(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def fusing(tmp_path_factory):
-    """Path of an untrained TofFusionNet."""
-    return write_samples_network(tmp_path_factory.mktemp("weights") / "fusing.safetensors")
+def fused(tmp_path_factory, tiny_bank):
+    """Folder of two TofFusionNets, 4 and 2, the second trained on frames half as high and wide.
 
-
-@pytest.fixture(scope="module")
-def fused(tmp_path_factory, tiny_bank, fusing):
-    """Folder of its files: 2.onnx, 4.onnx, 4.int8.onnx, numbers.json."""
+    Holds 4.safetensors, 4.onnx, 4.int8.onnx, numbers.json; 2.safetensors, 2.onnx.
+    """
     folder = tmp_path_factory.mktemp("onnx")
+    small = {"trained_height": HEIGHT // 2, "trained_width": WIDTH // 2}
+    four = write_samples_network(folder / "4.safetensors")
+    two = write_samples_network(folder / "2.safetensors", **small)
     words = ("--int8", "--check-bank", tiny_bank, "--json", folder / "numbers.json")
-    assert export(fusing, "--out", folder / "4.onnx", *words) == 0
+    assert export(four, "--out", folder / "4.onnx", *words) == 0
     few = ("--shots", "2", "--check-bank", "none")
-    assert export(fusing, "--out", folder / "2.onnx", *few) == 0
+    assert export(two, "--out", folder / "2.onnx", *few) == 0
     return folder
 
 
@@ -193,12 +193,10 @@ def test_the_pages_example_runs(capsys, monkeypatch, tmp_path, fused):
 
 
 @pytest.mark.parametrize("shots", [2, 4])
-def test_samples_become_what_the_unwrapper_and_the_correction_make_of_them(
-    fused, fusing, sensor, shots
-):
+def test_samples_become_what_the_unwrapper_and_the_correction_make_of_them(fused, sensor, shots):
     inputs, description = samples(shots), describe(sensor)
     found, sensed = run(fused / f"{shots}.onnx", **inputs), sensed_of(inputs)
-    looked = load_unwrapper(fusing).look(sensed, description)
+    looked = load_unwrapper(fused / f"{shots}.safetensors").look(sensed, description)
     depth = unwrapped(sensed, looked.distance_m, description)
     np.testing.assert_array_equal(found["valid"], depth.valid.numpy())
     assert 0.5 < found["valid"].mean() < 0.95
@@ -215,23 +213,14 @@ def test_samples_become_what_the_unwrapper_and_the_correction_make_of_them(
     assert len(np.unique(found["wraps"][kept])) > 2
 
 
-def test_a_large_frame_of_samples_is_thinned_inside_the_file(tmp_path, sensor):
-    small = {"trained_height": HEIGHT // 2, "trained_width": WIDTH // 2}
-    path = write_samples_network(tmp_path / "small.safetensors", **small)
-    assert export(path, "--out", tmp_path / "small.onnx", "--check-bank", "none") == 0
-    inputs, unwrapper = samples(4), load_unwrapper(path)
-    found, sensed = run(tmp_path / "small.onnx", **inputs), sensed_of(inputs)
-    looked = unwrapper.look(sensed, describe(sensor))
-    for name, expected in (("predicted_m", looked.distance_m), ("confidence", looked.confidence)):
-        assert (np.abs(found[name] - expected.numpy()) < 1e-3).mean() > 0.999, name
-    wraps = found["predicted_m"] - wrapped_distance_m(sensed, describe(sensor)).numpy()
-    wraps = wraps[found["valid"]] / UNAMBIGUOUS_M
-    assert np.abs(wraps - wraps.round()).max() < 1e-3
-    told = onnxruntime.InferenceSession(tmp_path / "small.onnx").get_modelmeta()
-    assert told.custom_metadata_map["every_row_and_column"] == "2"
-
-
-@pytest.mark.parametrize("name", ["su_net", "phasenet", "agresti_net", "chen_net"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "phasenet",
+        "agresti_net",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("su_net", "chen_net")),
+    ],
+)
 def test_peers_that_look_at_samples_serve_as_well(tmp_path, sensor, name):
     unwrapper = load_unwrapper(write_samples_network(tmp_path / "peer.safetensors", name))
     network = exported(unwrapper, describe(sensor), "nearest")
@@ -284,6 +273,7 @@ def test_files_of_samples_tell_their_inputs_and_how_many_samples(fused, name):
     ]
     told = session.get_modelmeta().custom_metadata_map
     assert told["network"] == "toffusionnet" and told["shots"] == str(shots)
+    assert told["every_row_and_column"] == ("2" if shots == 2 else "1")
     assert float(told["min_snr"]) == 1.0 and ("quantised" in told) == ("int8" in name)
 
 
@@ -447,8 +437,8 @@ def test_what_does_not_fit_is_one_sentence(capsys, tmp_path, segmenting, words, 
         (("--shots", "0"), "shots is 0; expected 2 or 4"),
     ],
 )
-def test_what_does_not_fit_samples_is_one_sentence(capsys, tmp_path, fusing, words, says):
-    refused(capsys, tmp_path, fusing, words, says)
+def test_what_does_not_fit_samples_is_one_sentence(capsys, tmp_path, fused, words, says):
+    refused(capsys, tmp_path, fused / "4.safetensors", words, says)
 
 
 def refused(capsys, tmp_path, network, words, says):
