@@ -40,7 +40,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("input", type=Path, help=".npy, .npz, or a folder of 16-bit PNG files")
     parser.add_argument("--sensor", default="epc660", help="name or path of a sensor configuration")
     parser.add_argument("--unwrapper", default="tofsegnet", help="name or path of a network")
-    parser.add_argument("--merge", type=Merge, default="nearest", help="nearest, or floor (eq. 6)")
+    parser.add_argument(
+        "--merge", type=Merge, default="nearest", help="nearest, floor (eq. 6), or none"
+    )
     parser.add_argument("--out", type=Path, default=Path("runs/corrected"), metavar="DIR")
     parser.add_argument("--gray", type=Path, metavar="FILE", help="gray images (.npy, .npz, .png)")
     parser.add_argument("--offset", type=Path, metavar="FILE", help="dark-offset map (.npy), LSB")
@@ -94,7 +96,7 @@ class Camera:
         Of the converter.
     unwrapper : str
         Name or path of a network; it is loaded where a recording has gray images.
-    merge : "nearest" or "floor"
+    merge : "nearest", "floor" or "none"
     horizontal_fov_deg : float
         Horizontal field of view.
     """

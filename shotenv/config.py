@@ -215,8 +215,9 @@ class EnvConfig(Section):
         "train", description="clips that drives are made of; all: those of no held-out family"
     )
     unwrapper: str = Field("tofregnet", description="name or path of an unwrapping network")
-    merge: Literal["nearest", "floor"] = Field(
-        "nearest", description="how prediction and wrapped map merge: ours, or eq. 6"
+    merge: Literal["nearest", "floor", "none"] = Field(
+        "nearest",
+        description="how prediction and wrapped map merge: ours, eq. 6, or the prediction alone",
     )
     observation: Literal["features"] = Field("features", description="what is observed")
     frames_per_drive: int = Field(256, ge=2, description="frames of one episode")

@@ -182,6 +182,18 @@ def test_few_samples_and_a_perfect_prediction_give_the_truth(truth, count, merge
     assert frame.valid.all()
 
 
+@pytest.mark.parametrize("count", [2, 4])
+def test_unmerged_the_prediction_stands_and_is_not_written_to(truth, count):
+    raw, predicted_m = raw_frame(truth, count), truth.float() + 0.3
+    before = predicted_m.clone()
+    frame = correct(raw, predicted_m, SENSOR, merge="none")
+    assert torch.equal(frame.distance_m, before)
+    assert frame.valid.all()
+    eight = correct(raw_frame(truth, 8), predicted_m, SENSOR, merge="none")
+    torch.testing.assert_close(eight.distance_m, truth.float(), rtol=0, atol=1e-3)
+    assert torch.equal(predicted_m, before)
+
+
 def test_eight_samples_need_no_prediction(truth):
     frame = correct(raw_frame(truth, 8), None, SENSOR)
     torch.testing.assert_close(frame.distance_m, truth.float(), rtol=0, atol=1e-3)

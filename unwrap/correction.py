@@ -17,7 +17,7 @@ from unwrap.acquisition import SAMPLES_PER_FREQUENCY, Shots
 from unwrap.calibration import WiggleTable, shift_turns
 from unwrap.dual import unwrap_dual
 from unwrap.frames import DepthFrame, PhaseFrame, RawFrame
-from unwrap.merge import merge_nearest, merge_regression
+from unwrap.merge import merge_nearest, merge_none, merge_regression
 from unwrap.phase import (
     angle_of,
     distance_m,
@@ -29,10 +29,11 @@ from unwrap.phase import (
     unambiguous_range_m,
 )
 
-Merge = Literal["nearest", "floor"]
+Merge = Literal["nearest", "floor", "none"]
 MERGES: dict[Merge, Callable[[Tensor, Tensor, float, float], Tensor]] = {
     "nearest": merge_nearest,
     "floor": merge_regression,
+    "none": merge_none,
 }
 
 
@@ -90,9 +91,10 @@ def correct(
         Two, four or eight samples.
     predicted_m : float32 [B, H, W] or None
         A network's coarse distance. None is allowed with eight samples.
-    merge : "nearest" or "floor"
-        The nearest wrap candidate, ours, or eq. 6. For TofSegNet, whose prediction lies within
-        its likeliest class, "floor" is eq. 8, with the prediction where the sensor saturates.
+    merge : "nearest", "floor" or "none"
+        The nearest wrap candidate, ours; eq. 6; or the prediction as it is, for networks that
+        refine the measured distance. For TofSegNet, whose prediction lies within its likeliest
+        class, "floor" is eq. 8, with the prediction where the sensor saturates.
     offset_lsb : float [H, W] or [B, H, W], optional
         Stored dark-offset map.
     noise_lsb : float or float [B, H, W], optional

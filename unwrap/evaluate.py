@@ -92,7 +92,9 @@ def _methods(shots: Shots) -> dict[str, Merge | None]:
     """Merge rule by name of method; None is the wrapped map as it is."""
     if shots == Shots.EIGHT:
         return {"8 DCS": "nearest"}
-    return {f"{shots:d} DCS wrap 0": None, **{f"{shots:d} DCS {rule}": rule for rule in MERGES}}
+    # Unmerged, the prediction has a row of its own.
+    rules = [rule for rule in MERGES if rule != "none"]
+    return {f"{shots:d} DCS wrap 0": None, **{f"{shots:d} DCS {rule}": rule for rule in rules}}
 
 
 def score(depth_m: Tensor, truth_m: Tensor, scored: Tensor, half_m: float) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Merging a coarse prediction with a wrapped distance map: eq. 6, eq. 8, and the nearest candidate.
+"""Merging a prediction with a wrapped distance map: eq. 6, eq. 8, the nearest candidate, or none.
 
 All take and return [..., H, W] in metres. Equation numbers are those of Nagiub et al. (2023).
 `wrapped_m` is the distance within one unambiguous range, `saturation_m` the wrapped distance from
@@ -41,6 +41,13 @@ def merge_nearest(
     """
     wraps = nearest_wraps(predicted_m, wrapped_m, unambiguous_m)
     return _merged(wraps, wrapped_m, unambiguous_m, predicted_m, saturation_m)
+
+
+def merge_none(
+    predicted_m: Tensor, wrapped_m: Tensor, unambiguous_m: float, saturation_m: float
+) -> Tensor:
+    """The prediction as it is: of networks that have seen the samples and refine each distance."""
+    return predicted_m.clone()
 
 
 def _merged(
