@@ -39,7 +39,9 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="samples of each frame, 2 or 4 (default), for a network that looks at them",
     )
     parser.add_argument("--sensor", default="epc660", help="name or path of a sensor configuration")
-    parser.add_argument("--merge", type=Merge, default="nearest", help="nearest, or floor (eq. 6)")
+    parser.add_argument(
+        "--merge", type=Merge, default="nearest", help="nearest, floor (eq. 6), or none"
+    )
     parser.add_argument("--int8", action="store_true", help="write FILE.int8.onnx, quantised, too")
     parser.add_argument(
         "--check-bank",

@@ -34,7 +34,7 @@ class Exported(nn.Module):
     ----------
     unwrapper : Unwrapper
     sensor : SensorDescription
-    merge : "nearest" or "floor"
+    merge : "nearest", "floor" or "none"
 
     Raises
     ------
