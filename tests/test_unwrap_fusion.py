@@ -10,7 +10,6 @@ import torch
 from peer_scenes import SENSOR, UNAMBIGUOUS_M, batch, samples, wraps_of
 
 from unwrap.fusion import (
-    CORRECTION,
     DOUBTED,
     FORGOTTEN,
     KNOTS_PER_WRAP,
@@ -130,7 +129,7 @@ def test_distance_lies_about_the_pixel_s_own_candidates_where_there_is_signal():
     assert signal.all()
     found_m = network.predict(output, sensed, SENSOR).distance_m
     correction_m = network.parts(output, wrapped_m)[1]
-    assert correction_m.abs().max() <= CORRECTION * UNAMBIGUOUS_M
+    assert correction_m.abs().max() <= UNAMBIGUOUS_M / 4
     wraps = (found_m - correction_m - wrapped_m) / UNAMBIGUOUS_M
     inside = found_m > 0
     torch.testing.assert_close(wraps[inside], wraps[inside].round(), atol=1e-4, rtol=0)

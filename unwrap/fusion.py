@@ -42,8 +42,6 @@ VECTOR = 2
 LEAST_ALONG = 0.01
 """Least component along the measured phase; its inverse bounds the gradient."""
 KNOTS_PER_WRAP = 2
-CORRECTION = 0.25
-"""Largest correction of a measured distance, in unambiguous ranges: a right angle of phase."""
 COARSE_WEIGHT = 0.2
 """Weight of the loss of the whole curve beside that of the wrap candidates."""
 CORRECTION_WEIGHT = 0.5
