@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -150,6 +151,32 @@ def in_order(source: Source, batch_size: int, shots: Sequence[Shots], *, draw: i
     ]
 
 
-def loader(source: Source, orders: Sampler[Order] | list[Order]) -> DataLoader:
-    """The batches of `source` in the given order."""
-    return DataLoader(Acquired(source), batch_size=None, sampler=orders)
+def loader(source: Source, orders: Sampler[Order] | list[Order], *, workers: int = 0) -> DataLoader:
+    """The batches of `source` in the given order, acquired by `workers` processes or right here.
+
+    What other processes acquire lies in memory that a GPU copies from by itself.
+    """
+    return DataLoader(
+        Acquired(source),
+        batch_size=None,
+        sampler=orders,
+        num_workers=workers,
+        persistent_workers=workers > 0,
+        pin_memory=workers > 0 and torch.cuda.is_available(),
+    )
+
+
+def training_device() -> torch.device:
+    """Where networks are trained and judged: on a GPU where there is one."""
+    return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+
+
+def acquiring_workers(device: torch.device) -> int:
+    """Processes that acquire frames for a network on `device`.
+
+    A GPU waits for as many cores as there are; on a processor the network itself needs them.
+    """
+    if device.type == "cpu":
+        return 0
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return max(1, (cores or 1) - 2)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
+import torch
 from torch import Tensor
 
 from unwrap.correction import Merge, SensorDescription, correct
@@ -62,6 +63,10 @@ class Sensed:
         """Number of frames."""
         return len(self.gray)
 
+    def pin_memory(self) -> Self:
+        """The same in memory that a GPU copies from by itself; torch's loader asks for it."""
+        return mapped(Tensor.pin_memory, self)
+
 
 @dataclass(frozen=True)
 class Truth:
@@ -77,6 +82,15 @@ class Truth:
 
     distance_m: Tensor
     known: Tensor
+
+    def pin_memory(self) -> Self:
+        """See `Sensed.pin_memory`."""
+        return mapped(Tensor.pin_memory, self)
+
+
+def moved(value: Value, device: torch.device) -> Value:
+    """`value`, of tensors as in `mapped`, on `device`; from pinned memory without waiting."""
+    return mapped(lambda tensor: tensor.to(device, non_blocking=True), value)
 
 
 def mapped(function: Callable[[Tensor], Tensor], value: Value) -> Value:

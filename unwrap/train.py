@@ -24,11 +24,19 @@ from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from torch import Tensor
 
 from unwrap.correction import SensorDescription
-from unwrap.data import Batch, EpochShuffle, Source, in_order, loader
+from unwrap.data import (
+    Batch,
+    EpochShuffle,
+    Source,
+    acquiring_workers,
+    in_order,
+    loader,
+    training_device,
+)
 from unwrap.files import write_json
 from unwrap.merge import nearest_wraps
 from unwrap.network import Prediction, autocast
-from unwrap.sensed import Sensed, Truth, mapped
+from unwrap.sensed import Sensed, Truth, moved
 from unwrap.train_config import TrainConfig
 from unwrap.weights import save_weights
 
@@ -40,6 +48,9 @@ FORWARD_STREAM = 2
 """Of what a network draws while it is trained."""
 JUDGED_DRAW = 0
 """Draw of the noise that networks are judged on; no epoch of training sees it."""
+
+NOTES_PER_EPOCH = 50
+"""Losses that TensorBoard is told of in an epoch; each makes a GPU wait for the processor."""
 
 ADVICE = (
     ".*does not have many workers.*",
@@ -96,8 +107,7 @@ class TrainingModule(lightning.LightningModule):
         self, batch: Batch, device: torch.device, dataloader_idx: int
     ) -> Batch:
         """Lightning does not know how to move frozen dataclasses."""
-        sensed, truth = batch
-        return mapped(lambda t: t.to(device), sensed), mapped(lambda t: t.to(device), truth)
+        return _moved(batch, device)
 
     def _seed_of(self, stream: int) -> int:
         """One 63-bit seed for a purpose in this step."""
@@ -135,6 +145,11 @@ class TrainingModule(lightning.LightningModule):
                 "the checkpoint was made with another configuration; start afresh with "
                 "resume=False, or write to another folder"
             )
+
+
+def _moved(batch: Batch, device: torch.device) -> Batch:
+    sensed, truth = batch
+    return moved(sensed, device), moved(truth, device)
 
 
 def wrap_hits(predicted_m: Tensor, truth_m: Tensor, config: TrainConfig) -> tuple[Tensor, Tensor]:
@@ -181,26 +196,29 @@ def train(
     KeyboardInterrupt
         Ctrl-C; the checkpoint is kept.
     """
-    frames, validation = sources("train"), sources("validation")
+    frames, validation, device = sources("train"), sources("validation"), training_device()
     shots, size = config.shown_shots, config.batch_size
     order = EpochShuffle(len(frames), size, shots, config.seed)
     judged = in_order(validation, size, shots, draw=JUDGED_DRAW)
     module = TrainingModule(config, frames.sensor, steps=config.epochs * len(order))
     checkpoint = out / f"{config.network}.ckpt"
+    workers = acquiring_workers(device)
+    judging = loader(validation, judged, workers=workers)
     with _quiet_lightning(), _interruptible():
-        _trainer(config, out, progress).fit(
+        _trainer(config, out, progress, len(order)).fit(
             module,
-            loader(frames, order),
-            loader(validation, judged),
+            loader(frames, order, workers=workers),
+            judging,
             ckpt_path=str(checkpoint) if resume and checkpoint.is_file() else None,
             weights_only=True,
         )
-    module.eval()
-    module.network.calibrate(loader(validation, judged), validation.sensor)
+    module.eval().to(device)
+    module.network.calibrate((_moved(batch, device) for batch in judging), validation.sensor)
     return _write(module, sources("test"), out)
 
 
-def _trainer(config: TrainConfig, out: Path, progress: bool) -> lightning.Trainer:
+def _trainer(config: TrainConfig, out: Path, progress: bool, steps: int) -> lightning.Trainer:
+    """The training loop, for epochs of so many `steps`."""
     every_epoch = ModelCheckpoint(
         out, config.network, save_top_k=1, monitor=None, enable_version_counter=False
     )
@@ -213,7 +231,8 @@ def _trainer(config: TrainConfig, out: Path, progress: bool) -> lightning.Traine
         num_sanity_val_steps=0,
         gradient_clip_val=config.clip_norm or None,
         logger=TensorBoardLogger(out, name="tensorboard", version=config.network),
-        log_every_n_steps=1,
+        log_every_n_steps=max(1, steps // NOTES_PER_EPOCH),
+        benchmark=training_device().type == "cuda",
         devices=1,
     )
 
@@ -274,11 +293,13 @@ def measure(module: TrainingModule, source: Source) -> dict[str, Any]:
     of eq. 6, `mae_m` the prediction's own error; all over pixels within the scored range, and over
     all numbers of samples that the network was trained with.
     """
-    config = module.config
-    module = module.eval().to("cpu")
+    config, device = module.config, training_device()
+    module = module.eval().to(device)
     orders = in_order(source, 1, config.shown_shots, draw=JUDGED_DRAW)
+    judging = loader(source, orders, workers=acquiring_workers(device))
     sums: dict[str, Tensor] = {}
-    for order, (sensed, truth) in zip(orders, loader(source, orders), strict=True):
+    for order, batch in zip(orders, judging, strict=True):
+        sensed, truth = _moved(batch, device)
         counts = _counts(module.predict(sensed).distance_m, truth, config)
         for key in (source.families[order.numbers[0]], "all"):
             sums[key] = sums.get(key, torch.zeros(4, dtype=torch.float64)) + counts
@@ -296,4 +317,4 @@ def _counts(predicted_m: Tensor, truth: Truth, config: TrainConfig) -> Tensor:
     unambiguous_m = config.settings.unambiguous_m
     floored = scored & (predicted_m // unambiguous_m == truth.distance_m // unambiguous_m)
     error = ((predicted_m - truth.distance_m).abs() * scored).sum()
-    return torch.stack((scored.sum(), right.sum(), floored.sum(), error)).double()
+    return torch.stack((scored.sum(), right.sum(), floored.sum(), error)).double().cpu()
