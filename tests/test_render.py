@@ -201,6 +201,22 @@ def test_an_unknown_variant_is_refused():
         llvm.start_mitsuba("scalar_rgb")
 
 
+def test_the_variant_is_the_one_that_the_environment_names(monkeypatch):
+    monkeypatch.delenv(llvm.VARIANT_VARIABLE, raising=False)
+    assert llvm.chosen_variant() == "llvm_ad_mono"
+    monkeypatch.setenv(llvm.VARIANT_VARIABLE, "cuda_ad_mono")
+    assert llvm.chosen_variant() == "cuda_ad_mono"
+    monkeypatch.setenv(llvm.VARIANT_VARIABLE, "cuda")
+    with pytest.raises(RendererError, match="SHOTENV_MITSUBA_VARIANT is 'cuda'; expected one of"):
+        llvm.require_device()
+
+
+def test_rendering_on_a_gpu_needs_no_llvm(no_library_named):
+    no_library_named.setenv(llvm.VARIANT_VARIABLE, "cuda_ad_mono")
+    no_library_named.setattr(llvm, "_candidates", lambda: iter(()))
+    llvm.require_device()
+
+
 # --- workers
 
 

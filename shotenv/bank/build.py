@@ -28,7 +28,7 @@ from shotenv.bank.store import (
 )
 from shotenv.config import BankConfig, Family, Split
 from shotenv.progress import progress, say
-from shotenv.render.llvm import require_llvm
+from shotenv.render.llvm import require_device
 from shotenv.render.workers import available_cores, run_jobs
 from unwrap.acquisition import Shots
 from unwrap.files import write_json
@@ -129,7 +129,7 @@ def build_bank(
     BankError
         `folder` holds another bank, or the disk has no room.
     shotenv.render.RendererError
-        No usable LLVM library, or a worker died.
+        No usable LLVM library or GPU, or a worker died.
     """
     folder = bank_folder(config) if folder is None else Path(folder)
     if _is_complete(folder, config):
@@ -226,7 +226,7 @@ def clips_standing(config: BankConfig) -> tuple[int, int]:
 def _render(jobs: Sequence[ClipJob], config: BankConfig, workers: int) -> None:
     if not jobs:
         return
-    require_llvm()
+    require_device()
     frames = config.world.frames_per_clip
     with progress(len(jobs) * frames, "rendering", "frame") as bar:
         jobs_per_worker = max(1, FRAMES_PER_WORKER // frames)

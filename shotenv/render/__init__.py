@@ -7,7 +7,7 @@ processes.
 
 from shotenv.render.frame import FrameRenderer, RenderedFrame, render_frame
 from shotenv.render.instants import Instants, frame_instants
-from shotenv.render.llvm import RendererError, find_llvm, require_llvm
+from shotenv.render.llvm import RendererError, find_llvm, require_device, require_llvm
 
 __all__ = [
     "FrameRenderer",
@@ -17,5 +17,6 @@ __all__ = [
     "find_llvm",
     "frame_instants",
     "render_frame",
+    "require_device",
     "require_llvm",
 ]

@@ -18,6 +18,7 @@ OLDEST_LLVM = 16
 LIBRARY_VARIABLE = "DRJIT_LIBLLVM_PATH"
 CURE = "install one with: apt-get install libllvm19"
 VARIANTS = ("llvm_ad_mono", "cuda_ad_mono")
+VARIANT_VARIABLE = "SHOTENV_MITSUBA_VARIANT"
 _FOLDERS = (
     "/usr/lib",
     "/usr/lib64",
@@ -92,10 +93,38 @@ def llvm_version(path: str) -> int:
         return min(_version_in_name(str(Path(path).resolve())), OLDEST_LLVM - 1) or 1
 
 
+def chosen_variant() -> str:
+    """Variant named by `SHOTENV_MITSUBA_VARIANT`, else LLVM.
+
+    Raises
+    ------
+    RendererError
+        The variable names no variant that we render with.
+    """
+    named = os.environ.get(VARIANT_VARIABLE) or VARIANTS[0]
+    if named not in VARIANTS:
+        expected = ", ".join(VARIANTS)
+        raise RendererError(f"{VARIANT_VARIABLE} is {named!r}; expected one of {expected}")
+    return named
+
+
+def require_device() -> None:
+    """Refuse to render where the chosen variant lacks what it needs, as far as a look can tell.
+
+    Raises
+    ------
+    RendererError
+        See `chosen_variant` and `require_llvm`.
+    """
+    if chosen_variant() == "llvm_ad_mono":
+        require_llvm()
+
+
 def start_mitsuba(variant: str | None = None) -> Any:
     """The mitsuba module with its variant set: the one place that does so.
 
-    `variant` is `llvm_ad_mono`, `cuda_ad_mono` or None: the one already set, else LLVM.
+    `variant` is `llvm_ad_mono`, `cuda_ad_mono` or None: the one already set, else the one that
+    `chosen_variant` gives.
 
     Raises
     ------
@@ -115,7 +144,7 @@ def start_mitsuba(variant: str | None = None) -> Any:
         ) from None
     if variant is None and mitsuba.variant() in VARIANTS:
         return mitsuba
-    chosen = variant or VARIANTS[0]
+    chosen = variant or chosen_variant()
     if chosen == "llvm_ad_mono":
         require_llvm()
     elif not drjit.has_backend(drjit.JitBackend.CUDA):

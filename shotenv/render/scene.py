@@ -66,7 +66,7 @@ class Scene:
 
     def __init__(self, geometry: Geometry, static: StaticScene):
         self._static = static.scene
-        self._moving = _mitsuba_scene(geometry.moving)
+        self._moving = _mitsuba_scene(geometry.moving, beside=static.scene)
         self._tile = upload(geometry.tile_m)
         self._normals = upload(geometry.normals)
         self._surface = upload(geometry.surface)
@@ -76,7 +76,8 @@ class Scene:
         )
         self._has_panes = dr.opaque(mi.Bool, len(geometry.panes) > 0)
         # A mesh cannot be empty.
-        self._panes = _mitsuba_scene(geometry.panes if len(geometry.panes) else geometry.moving[:1])
+        panes = geometry.panes if len(geometry.panes) else geometry.moving[:1]
+        self._panes = _mitsuba_scene(panes, beside=static.scene)
         self._static_faces = dr.opaque(mi.UInt32, geometry.static_faces)
         self._moving_faces = dr.opaque(mi.UInt32, len(geometry.moving) // len(geometry.tile_m))
 
@@ -163,8 +164,11 @@ def _ray(origin, direction, length):
     return ray
 
 
-def _mitsuba_scene(corners: np.ndarray):
-    return mi.load_dict({"type": "scene", "mesh": triangle_mesh(corners)})
+def _mitsuba_scene(corners: np.ndarray, beside: Any = None):
+    """Triangles [F, 3, 3], ready for rays; in one kernel with `beside`, another such scene."""
+    parts = {"type": "scene", "mesh": triangle_mesh(corners)}
+    # OptiX traces rays of several scenes in one kernel only where they share a binding table.
+    return mi.load_dict(parts if beside is None else parts | {"parent_scene": beside})
 
 
 def triangle_mesh(corners: np.ndarray, bsdf: Any = None, **attributes: np.ndarray) -> Any:
