@@ -20,6 +20,8 @@ from unwrap.zoo import NAMES
 __all__ = ["Merge", "Prediction", "SensorDescription", "Unwrapper", "correct", "load_unwrapper"]
 
 SHIPPED = Path(__file__).parent / "weights"
+FRAMES_AT_ONCE = {"cpu": 1, "cuda": 64}
+"""Frames that a network is shown at a time: one keeps a processor's caches, many fill a GPU."""
 
 
 @dataclass(frozen=True)
@@ -76,10 +78,11 @@ class Unwrapper:
     def look(self, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         """Distance from all that a sensor delivers.
 
-        Frames are computed one by one, so that a prediction does not depend on its batch. Those k
-        times as high and wide as the training frames are thinned as in `predict`; a network that
-        needs samples then tells only the wraps of pixels with a usable signal, which are added to
-        each pixel's own wrapped distance.
+        On a processor frames are computed one by one, so that a prediction does not depend on its
+        batch; on a GPU many at once, where it may in the last bits. Frames k times as high and
+        wide as the training frames are thinned as in `predict`; a network that needs samples then
+        tells only the wraps of pixels with a usable signal, which are added to each pixel's own
+        wrapped distance.
 
         Raises
         ------
@@ -91,13 +94,15 @@ class Unwrapper:
         self.require_frequency(sensor)
         device = next(self.network.parameters()).device
 
-        def only(index: int) -> Sensed:
-            return mapped(lambda tensor: tensor[index : index + 1].to(device), sensed)
+        count = FRAMES_AT_ONCE[device.type]
 
-        frames = [self._one(only(index), sensor) for index in range(len(sensed))]
+        def some(start: int) -> Sensed:
+            return mapped(lambda tensor: tensor[start : start + count].to(device), sensed)
+
+        parts = [self._predicted(some(start), sensor) for start in range(0, len(sensed), count)]
         return Prediction(
-            torch.cat([frame.distance_m for frame in frames]).to(sensed.gray.device),
-            torch.cat([frame.confidence for frame in frames]).to(sensed.gray.device),
+            torch.cat([part.distance_m for part in parts]).to(sensed.gray.device),
+            torch.cat([part.confidence for part in parts]).to(sensed.gray.device),
         )
 
     def require_frequency(self, sensor: SensorDescription) -> None:
@@ -106,7 +111,7 @@ class Unwrapper:
             trained = f"{self.name} was trained for {self.metadata['f1_hz']:g}"
             raise ValueError(f"f1_hz is {sensor.f1_hz:g}; {trained}")
 
-    def _one(self, sensed: Sensed, sensor: SensorDescription) -> Prediction:
+    def _predicted(self, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         stride = self.stride(*sensed.gray.shape[-2:])
         shown = thinned(sensed, stride)
         with autocast(sensed.gray.device):
