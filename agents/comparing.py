@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from typing import Any
 
 import torch
@@ -14,7 +15,7 @@ from agents.comparison import Training
 from shotenv.sensed import SensedFrames
 from unwrap.acquisition import Shots
 from unwrap.correction import SensorDescription
-from unwrap.data import in_order, loader
+from unwrap.data import acquiring_workers, in_order, loader
 from unwrap.evaluate import score
 from unwrap.inputs import samples_of
 from unwrap.peers.amplitude import unwrap_amplitude
@@ -22,7 +23,7 @@ from unwrap.peers.kernel_density import unwrap_kernel_density
 from unwrap.peers.reflectance import ReflectancePrior, calibrate
 from unwrap.phase import unambiguous_range_m
 from unwrap.reliability import expected_calibration_error
-from unwrap.sensed import Memory, Sensed, unwrapped
+from unwrap.sensed import Memory, Sensed, mapped, moved, unwrapped
 from unwrap.train import JUDGED_DRAW
 from unwrap.unwrapper import Unwrapper
 
@@ -32,6 +33,9 @@ TRUSTED = 0.5
 CALIBRATION_DRAW = 1
 """Draw of the training frames that the reflectance prior is measured on."""
 CALIBRATION_BATCH = 16
+CPU = torch.device("cpu")
+SCORED_AT_ONCE = {"cpu": 1, "cuda": 16}
+"""Frames that methods look at together; what methods do is small work for a GPU."""
 
 
 @dataclass(frozen=True)
@@ -72,10 +76,16 @@ class Method:
 def methods_of(training: Training, network: Unwrapper) -> Iterator[Method]:
     """A trained network's own distance, and merged with the wrapped map where it is coarse."""
 
+    seen: list[tuple[Sensed, Estimate]] = []
+
     def own(sensed: Sensed, sensor: SensorDescription) -> Estimate:
-        found = network.look(sensed, sensor)
-        probable = training.config.network in PROBABILITIES
-        return Estimate(found.distance_m, found.confidence if probable else None)
+        # The rules of merging ask for the same frames one after the other.
+        if not (seen and seen[-1][0] is sensed):
+            found = network.look(sensed, sensor)
+            probable = training.config.network in PROBABILITIES
+            estimate = Estimate(found.distance_m, found.confidence if probable else None)
+            seen[:] = [(sensed, estimate)]
+        return seen[-1][1]
 
     def merged(rule: Any) -> Look:
         def look(sensed: Sensed, sensor: SensorDescription) -> Estimate:
@@ -98,7 +108,9 @@ PROBABILITIES = ("tofsegnet", "toffusionnet", "phasenet", "chen_net")
 """Networks whose confidence is the probability that the wrap is right."""
 
 
-def classical_methods(training_frames: SensedFrames) -> Iterator[Method]:
+def classical_methods(
+    training_frames: SensedFrames, *, device: torch.device = CPU
+) -> Iterator[Method]:
     """What needs no network; the reflectance prior is measured on frames of the training split."""
 
     def eight(sensed: Sensed, sensor: SensorDescription) -> Estimate:
@@ -116,7 +128,7 @@ def classical_methods(training_frames: SensedFrames) -> Iterator[Method]:
         )
         return Estimate(found.depth.distance_m)
 
-    priors = {shots: _prior(training_frames, shots) for shots in FEW}
+    priors = {shots: _prior(training_frames, shots, device) for shots in FEW}
 
     def amplitude(sensed: Sensed, sensor: SensorDescription) -> Estimate:
         found = unwrap_amplitude(
@@ -136,9 +148,12 @@ def classical_methods(training_frames: SensedFrames) -> Iterator[Method]:
     yield Method("amplitude (Crabb and Manduchi 2014)", "none", FEW, amplitude)
 
 
-def _prior(frames: SensedFrames, shots: Shots) -> ReflectancePrior:
+def _prior(frames: SensedFrames, shots: Shots, device: torch.device) -> ReflectancePrior:
     orders = in_order(frames, CALIBRATION_BATCH, (shots,), draw=CALIBRATION_DRAW)
-    return calibrate(loader(frames, orders), frames.sensor)
+    batches = loader(frames, orders, workers=acquiring_workers(device))
+    return calibrate(
+        ((moved(sensed, device), moved(truth, device)) for sensed, truth in batches), frames.sensor
+    )
 
 
 @torch.inference_mode()
@@ -146,29 +161,31 @@ def rows_of(
     methods: Sequence[Method],
     frames: SensedFrames,
     *,
+    device: torch.device = CPU,
     tick: Callable[[int], object] = lambda frames: None,
 ) -> list[dict[str, Any]]:
     """A row for each method and number of samples: means over all frames.
 
-    Frames come one by one in their order, so that a method which remembers has seen the frame
-    before.
+    The frames come in their order, so that a method which remembers has seen the frame before.
+    `device` is where the networks are; `tick` is told of the frames scored, once for each number
+    of samples.
     """
     tallies = {
-        (method, shots): _Tally(frames)
+        (method, shots): _Tally(method, frames)
         for method in methods
         for shots in Shots
         if shots in method.shots
     }
-    for number in range(len(frames)):
-        scored = frames.scored([number], draw=JUDGED_DRAW)
-        for shots in dict.fromkeys(shots for _, shots in tallies):
-            sensed, truth = frames.batch([number], draw=JUDGED_DRAW, shots=shots)
-            for (method, its_shots), tally in tallies.items():
-                if its_shots == shots:
-                    shown = replace(sensed, memory=tally.memory(method, number))
-                    estimate = method.look(shown, frames.sensor)
-                    tally.add(estimate, truth.distance_m, scored & truth.known)
-        tick(1)
+    for shots in dict.fromkeys(shots for _, shots in tallies):
+        of_shots = [tally for (_, its), tally in tallies.items() if its == shots]
+        orders = in_order(frames, SCORED_AT_ONCE[device.type], (shots,), draw=JUDGED_DRAW)
+        batches = loader(frames, orders, workers=acquiring_workers(device))
+        for order, (sensed, truth) in zip(orders, batches, strict=True):
+            scored = frames.scored(order.numbers, draw=JUDGED_DRAW) & truth.known
+            shown, truth_m = moved(sensed, device), truth.distance_m.to(device)
+            for tally in of_shots:
+                tally.judge(shown, order.numbers, truth_m, scored.to(device))
+            tick(len(sensed))
     return [
         {"method": method.label, "shots": int(shots), "merge": method.merge, **tally.means()}
         for (method, shots), tally in tallies.items()
@@ -178,8 +195,8 @@ def rows_of(
 class _Tally:
     """What one method made of the frames so far."""
 
-    def __init__(self, frames: SensedFrames):
-        self._frames = frames
+    def __init__(self, method: Method, frames: SensedFrames):
+        self._method, self._frames = method, frames
         self._unambiguous_m = unambiguous_range_m(frames.sensor.f1_hz)
         self._scores: list[dict[str, float]] = []
         self._confidence: list[Tensor] = []
@@ -187,18 +204,35 @@ class _Tally:
         self._last: Estimate | None = None
         self._confusion = torch.zeros(CLASSES, CLASSES, dtype=torch.int64)
 
-    def memory(self, method: Method, number: int) -> Memory | None:
+    def judge(
+        self, sensed: Sensed, numbers: Sequence[int], truth_m: Tensor, scored: Tensor
+    ) -> None:
+        """Let the method look at frames [B], all at once unless it remembers, and score them."""
+        if self._method.remembers:
+            for place, number in enumerate(numbers):
+                shown = mapped(itemgetter(slice(place, place + 1)), sensed)
+                shown = replace(shown, memory=self._memory(number))
+                self._last = self._method.look(shown, self._frames.sensor)
+                self._add(self._last, truth_m[place], scored[place])
+            return
+        shown = sensed if sensed.memory is None else replace(sensed, memory=None)
+        estimate = self._method.look(shown, self._frames.sensor)
+        for place in range(len(numbers)):
+            one = mapped(itemgetter(slice(place, place + 1)), estimate)
+            self._add(one, truth_m[place], scored[place])
+
+    def _memory(self, number: int) -> Memory | None:
         """What the method remembers of the frame before; nothing at the start of a clip."""
         last = self._last
-        if not method.remembers or last is None or not self._frames.follows(number):
+        if last is None or not self._frames.follows(number):
             return None
         trusted = torch.ones_like(last.depth_m) if last.confidence is None else last.confidence
         seen_m = last.depth_m.masked_fill(trusted < TRUSTED, torch.nan)
-        return self._frames.moved(seen_m, [number])
+        return moved(self._frames.moved(seen_m.cpu(), [number]), seen_m.device)
 
-    def add(self, estimate: Estimate, truth_m: Tensor, scored: Tensor) -> None:
-        """Score one frame; depth that is missing counts as 0."""
-        self._last = estimate
+    def _add(self, estimate: Estimate, truth_m: Tensor, scored: Tensor) -> None:
+        """Score one frame, of truth [H, W]; depth that is missing counts as 0."""
+        truth_m, scored = truth_m[None], scored[None]
         depth_m = estimate.depth_m.nan_to_num(0.0)
         range_m = self._frames.sensor.max_range_m
         half_m = self._unambiguous_m / 2
@@ -208,7 +242,7 @@ class _Tally:
         )
         true, found = (self._classes(map_m[scored]) for map_m in (truth_m, depth_m))
         counts = torch.bincount(true * CLASSES + found, minlength=CLASSES**2)
-        self._confusion += counts.view(CLASSES, CLASSES)
+        self._confusion += counts.view(CLASSES, CLASSES).cpu()
         if estimate.confidence is not None:
             self._confidence.append(estimate.confidence[scored].clamp(0, 1).half())
             self._right.append(((depth_m - truth_m).abs() < half_m)[scored])

@@ -16,6 +16,7 @@ from agents.unwrapping import sources
 from shotenv.config import SensorConfig, find_config, read_config
 from shotenv.progress import progress, say
 from shotenv.sensed import SensedFrames
+from unwrap.data import training_device
 from unwrap.files import write_bytes, write_json
 from unwrap.phase import unambiguous_range_m
 from unwrap.train_config import TrainConfig
@@ -47,6 +48,8 @@ def make_table(
     if not wanted:
         raise ValueError(f"only is {only}; expected some of {', '.join(config.networks)}")
     networks = {training: trained(training, out) for training in wanted}
+    for unwrapper in networks.values():
+        unwrapper.network.to(training_device())
     if only:
         say(f"{len(networks)} networks stand in {out}")
         return []
@@ -73,7 +76,7 @@ def _rows(networks: dict[Training, Unwrapper]) -> list[Row]:
         methods = [method for pair in of.items() for method in methods_of(*pair)]
         if (split_by, truth) == ("clip", "rendered"):
             training_frames = sources(config)("train")
-            methods += classical_methods(training_frames)
+            methods += classical_methods(training_frames, device=training_device())
         rows += _scored(methods, config, "test", {"split": split_by, "truth": truth})
         if (split_by, truth) == ("clip", "rendered") and _has_held_out(training_frames):
             rows += _scored(methods, config, "shift", {"split": "shift", "truth": truth})
@@ -88,8 +91,10 @@ def _scored(
     methods: list[Method], config: TrainConfig, split: str, of: dict[str, str]
 ) -> list[Row]:
     frames: SensedFrames = sources(config)(split)
-    with progress(len(frames), f"scoring {' '.join(of.values())}", "frame") as bar:
-        return [{**row, **of} for row in rows_of(methods, frames, tick=bar.update)]
+    times = len({shots for method in methods for shots in method.shots})
+    with progress(times * len(frames), f"scoring {' '.join(of.values())}", "frame") as bar:
+        rows = rows_of(methods, frames, device=training_device(), tick=bar.update)
+        return [{**row, **of} for row in rows]
 
 
 def _page(config: TableConfig, rows: list[Row]) -> str:

@@ -6,6 +6,7 @@ import torch
 from PIL import Image
 
 from agents.comparing import (
+    SCORED_AT_ONCE,
     Estimate,
     Method,
     accuracy_and_precision,
@@ -31,10 +32,10 @@ def frames(tiny_bank):
 def test_a_perfect_method_has_no_error_and_a_blind_one_the_scene_s(frames):
     _, truth = frames.batch(range(len(frames)), draw=0, shots=None)
     scored = frames.scored(range(len(frames)), draw=0)
-    places = iter(range(2 * len(frames)))
+    places = iter([*range(len(frames)), *range(len(frames))])
 
     def perfect(sensed, sensor):
-        return Estimate(truth.distance_m[[next(places) // 2]], torch.ones_like(sensed.gray))
+        return Estimate(truth.distance_m[[next(places)]], torch.ones_like(sensed.gray))
 
     def blind(sensed, sensor):
         return Estimate(torch.full_like(sensed.gray, torch.nan))
@@ -54,6 +55,19 @@ def test_a_perfect_method_has_no_error_and_a_blind_one_the_scene_s(frames):
     expected_m = float(torch.stack(means).mean()) - MIN_DEPTH_M
     assert rows["blind", 2]["mae_m"] == pytest.approx(expected_m, abs=1e-5)
     assert "calibration_error" not in rows["blind", 2]
+
+
+def test_frames_looked_at_together_score_as_one_by_one(frames, monkeypatch):
+    def look(sensed, sensor):
+        depth_m = unwrapped(sensed, 12 * sensed.gray, sensor).distance_m
+        if sensed.memory is not None:
+            depth_m = torch.where(sensed.memory.known > 0, sensed.memory.distance_m, depth_m)
+        return Estimate(depth_m, sensed.gray)
+
+    methods = [Method(f"{i}", "none", (Shots.FOUR,), look, remembers=i > 0) for i in range(2)]
+    alone = rows_of(methods, frames)
+    monkeypatch.setitem(SCORED_AT_ONCE, "cpu", 3)
+    assert rows_of(methods, frames) == alone
 
 
 def test_what_remembers_gets_its_own_trusted_depth_moved(frames):
