@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import render_jobs
+import torch_jobs
 from render_worlds import DARK, SMALL, floor, mesh, square, wall, world
 
 from shotenv.render import RendererError, find_llvm, frame_instants, llvm, render_frame, workers
@@ -225,6 +226,11 @@ def test_jobs_come_back_with_their_results_from_replaced_workers():
     assert {job: square for job, (square, _) in done.items()} == {i: i * i for i in range(3)}
     assert len({pid for _, pid in done.values()}) == 2
     assert not multiprocessing.active_children()
+
+
+def test_workers_share_the_cores_with_torch_too():
+    share = max(1, workers.available_cores() // 2)
+    assert dict(run_jobs(torch_jobs.threads, [0], workers=2)) == {0: share}
 
 
 def test_leaving_the_loop_ends_the_workers():

@@ -227,6 +227,9 @@ def _die_with_parent() -> None:
 
 
 def _limit_threads(threads: int) -> None:
+    """Keep what computes in this process to its share; threads of many workers thrash."""
+    if "torch" in sys.modules:  # Loaded with the function, by those that use it.
+        sys.modules["torch"].set_num_threads(threads)
     try:
         import drjit
     except ImportError:
