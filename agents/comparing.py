@@ -15,7 +15,7 @@ from agents.comparison import Training
 from shotenv.sensed import SensedFrames
 from unwrap.acquisition import Shots
 from unwrap.correction import SensorDescription
-from unwrap.data import acquiring_workers, in_order, loader
+from unwrap.data import acquiring_threads, in_order, loader
 from unwrap.evaluate import score
 from unwrap.inputs import samples_of
 from unwrap.peers.amplitude import unwrap_amplitude
@@ -150,7 +150,7 @@ def classical_methods(
 
 def _prior(frames: SensedFrames, shots: Shots, device: torch.device) -> ReflectancePrior:
     orders = in_order(frames, CALIBRATION_BATCH, (shots,), draw=CALIBRATION_DRAW)
-    batches = loader(frames, orders, workers=acquiring_workers(device))
+    batches = loader(frames, orders, threads=acquiring_threads(device))
     return calibrate(
         ((moved(sensed, device), moved(truth, device)) for sensed, truth in batches), frames.sensor
     )
@@ -179,7 +179,7 @@ def rows_of(
     for shots in dict.fromkeys(shots for _, shots in tallies):
         of_shots = [tally for (_, its), tally in tallies.items() if its == shots]
         orders = in_order(frames, SCORED_AT_ONCE[device.type], (shots,), draw=JUDGED_DRAW)
-        batches = loader(frames, orders, workers=acquiring_workers(device))
+        batches = loader(frames, orders, threads=acquiring_threads(device))
         for order, (sensed, truth) in zip(orders, batches, strict=True):
             scored = frames.scored(order.numbers, draw=JUDGED_DRAW) & truth.known
             shown, truth_m = moved(sensed, device), truth.distance_m.to(device)

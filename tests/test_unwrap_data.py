@@ -1,3 +1,5 @@
+import threading
+
 import pytest
 import torch
 from unwrap_source import Walls
@@ -96,3 +98,26 @@ def test_loader_acquires_what_is_ordered():
         assert torch.equal(truth.distance_m, true.distance_m)
     assert batches[0][0].raw.shots == Shots.FOUR
     assert batches[1][0].raw is None
+
+
+def test_what_is_acquired_ahead_is_what_is_ordered():
+    source, orders = Walls(4), [Order((i % 4,), i, Shots.TWO) for i in range(9)]
+    batches = loader(source, orders, threads=3)
+    assert len(batches) == len(orders)
+    for (sensed, _), order in zip(batches, orders, strict=True):
+        expected, _ = source.batch(order.numbers, draw=order.draw, shots=order.shots)
+        assert torch.equal(sensed.raw.dcs_lsb, expected.raw.dcs_lsb)
+
+
+def test_leaving_the_batches_ends_the_threads():
+    before = threading.active_count()
+    batches = iter(loader(Walls(4), [Order((0,), i, Shots.TWO) for i in range(50)], threads=2))
+    next(batches)
+    batches.close()
+    assert threading.active_count() == before
+
+
+def test_what_cannot_be_acquired_ahead_raises_where_it_is_used():
+    batches = loader(Walls(2), [Order((0,), 0, None), Order((7,), 0, None)], threads=2)
+    with pytest.raises(IndexError):
+        list(batches)

@@ -95,6 +95,14 @@ def test_resumed_training_equals_uninterrupted(tmp_path, monkeypatch):
     assert all(torch.equal(one[name], other[name]) for name in one)
 
 
+def test_frames_acquired_ahead_train_the_same_weights(tmp_path, monkeypatch):
+    config = TrainConfig(network="phasenet", width=4, epochs=2, batch_size=2)
+    alone = load_file(train(config, walls, tmp_path / "alone", progress=False))
+    monkeypatch.setattr("unwrap.train.acquiring_threads", lambda device: 2)
+    ahead = load_file(train(config, walls, tmp_path / "ahead", progress=False))
+    assert all(torch.equal(ahead[name], tensor) for name, tensor in alone.items())
+
+
 def test_interrupt_keeps_the_checkpoint(tmp_path, monkeypatch):
     step = TrainingModule.training_step
 

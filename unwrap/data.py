@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import os
+from collections import deque
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, Protocol
@@ -151,19 +152,61 @@ def in_order(source: Source, batch_size: int, shots: Sequence[Shots], *, draw: i
     ]
 
 
-def loader(source: Source, orders: Sampler[Order] | list[Order], *, workers: int = 0) -> DataLoader:
-    """The batches of `source` in the given order, acquired by `workers` processes or right here.
+def loader(
+    source: Source, orders: Sampler[Order] | list[Order], *, threads: int = 0
+) -> DataLoader | AcquiredAhead:
+    """The batches of `source` in the given order, acquired when asked for or ahead by threads."""
+    if threads:
+        return AcquiredAhead(source, orders, threads)
+    return DataLoader(Acquired(source), batch_size=None, sampler=orders)
 
-    What other processes acquire lies in memory that a GPU copies from by itself.
+
+class AcquiredAhead:
+    """Batches of a source in the given order, acquired ahead of a GPU that would have to wait.
+
+    By threads, as torch computes without holding up the others, and processes forked beside a GPU
+    are fragile. The batches lie in memory that the GPU copies from by itself.
+
+    Parameters
+    ----------
+    source : Source
+    sampler : sampler or list of Order
+        What to acquire; a sampler is told of each epoch by the training loop.
+    threads : int
+        At least 1.
     """
-    return DataLoader(
-        Acquired(source),
-        batch_size=None,
-        sampler=orders,
-        num_workers=workers,
-        persistent_workers=workers > 0,
-        pin_memory=workers > 0 and torch.cuda.is_available(),
-    )
+
+    batch_sampler = None
+    """There is none; the training loop asks for it where it finds a `sampler`."""
+
+    def __init__(self, source: Source, sampler: Sampler[Order] | list[Order], threads: int):
+        self.sampler, self.threads, self._acquired = sampler, threads, Acquired(source)
+
+    def __len__(self) -> int:
+        """Number of batches."""
+        return len(self.sampler)  # type: ignore[arg-type]
+
+    def __iter__(self) -> Iterator[Batch]:
+        """The batches; leaving the loop ends the threads."""
+        # Threads side by side are quicker than one operation spread over the cores.
+        pool = ThreadPoolExecutor(self.threads, initializer=torch.set_num_threads, initargs=(1,))
+        waiting: deque[Future[Batch]] = deque()
+        try:
+            for order in self.sampler:
+                waiting.append(pool.submit(self._acquire, order))
+                if len(waiting) > self.threads:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+    def _acquire(self, order: Order) -> Batch:
+        batch = self._acquired[order]
+        if not torch.cuda.is_available():
+            return batch
+        sensed, truth = batch
+        return mapped(Tensor.pin_memory, sensed), mapped(Tensor.pin_memory, truth)
 
 
 def training_device() -> torch.device:
@@ -171,12 +214,9 @@ def training_device() -> torch.device:
     return torch.device("cuda" if torch.cuda.is_available() else "cpu")
 
 
-def acquiring_workers(device: torch.device) -> int:
-    """Processes that acquire frames for a network on `device`.
+def acquiring_threads(device: torch.device) -> int:
+    """Threads that acquire frames ahead for a network on `device`.
 
     A GPU waits for as many cores as there are; on a processor the network itself needs them.
     """
-    if device.type == "cpu":
-        return 0
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return max(1, (cores or 1) - 2)
+    return 0 if device.type == "cpu" else max(1, torch.get_num_threads() - 1)

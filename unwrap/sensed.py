@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Self, TypeVar
+from typing import Any, TypeVar
 
 import torch
 from torch import Tensor
@@ -63,10 +63,6 @@ class Sensed:
         """Number of frames."""
         return len(self.gray)
 
-    def pin_memory(self) -> Self:
-        """The same in memory that a GPU copies from by itself; torch's loader asks for it."""
-        return mapped(Tensor.pin_memory, self)
-
 
 @dataclass(frozen=True)
 class Truth:
@@ -82,10 +78,6 @@ class Truth:
 
     distance_m: Tensor
     known: Tensor
-
-    def pin_memory(self) -> Self:
-        """See `Sensed.pin_memory`."""
-        return mapped(Tensor.pin_memory, self)
 
 
 def moved(value: Value, device: torch.device) -> Value:

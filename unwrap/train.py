@@ -28,7 +28,7 @@ from unwrap.data import (
     Batch,
     EpochShuffle,
     Source,
-    acquiring_workers,
+    acquiring_threads,
     in_order,
     loader,
     training_device,
@@ -202,12 +202,12 @@ def train(
     judged = in_order(validation, size, shots, draw=JUDGED_DRAW)
     module = TrainingModule(config, frames.sensor, steps=config.epochs * len(order))
     checkpoint = out / f"{config.network}.ckpt"
-    workers = acquiring_workers(device)
-    judging = loader(validation, judged, workers=workers)
+    threads = acquiring_threads(device)
+    judging = loader(validation, judged, threads=threads)
     with _quiet_lightning(), _interruptible():
         _trainer(config, out, progress, len(order)).fit(
             module,
-            loader(frames, order, workers=workers),
+            loader(frames, order, threads=threads),
             judging,
             ckpt_path=str(checkpoint) if resume and checkpoint.is_file() else None,
             weights_only=True,
@@ -296,7 +296,7 @@ def measure(module: TrainingModule, source: Source) -> dict[str, Any]:
     config, device = module.config, training_device()
     module = module.eval().to(device)
     orders = in_order(source, 1, config.shown_shots, draw=JUDGED_DRAW)
-    judging = loader(source, orders, workers=acquiring_workers(device))
+    judging = loader(source, orders, threads=acquiring_threads(device))
     sums: dict[str, Tensor] = {}
     for order, batch in zip(orders, judging, strict=True):
         sensed, truth = _moved(batch, device)
