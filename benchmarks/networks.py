@@ -18,7 +18,8 @@ from torch import Tensor
 from benchmarks.rows import row
 from benchmarks.turns import alternately
 from unwrap.correction import SensorDescription
-from unwrap.network import Settings, autocast
+from unwrap.inference import prepared
+from unwrap.network import Settings, arithmetic, autocast
 from unwrap.sensed import Sensed, Truth
 from unwrap.train import TrainConfig, TrainingModule
 from unwrap.unwrapper import Unwrapper, load_unwrapper
@@ -99,7 +100,7 @@ def training(unwrapper: Unwrapper, device: torch.device, batch: int, rounds: int
 
 def outside(unwrapper: Unwrapper, device: torch.device, rounds: int) -> dict[str, Any]:
     """Share of the time of `Unwrapper.predict` that is not its network's."""
-    gray, network = images(1, device), unwrapper.network
+    gray, network = images(1, device), prepared(unwrapper.network, device)
     features = network.features(Sensed(gray), SensorDescription())
 
     @torch.inference_mode()
@@ -145,13 +146,6 @@ def warm_and_timed(
 
     alternately(first, second, 1, clock)
     return alternately(first, second, rounds, clock)
-
-
-def arithmetic(device: torch.device) -> torch.dtype:
-    """Type that products have on this device where networks run."""
-    one = torch.ones(1, 1, device=device)
-    with autocast(device):
-        return (one @ one).dtype
 
 
 def where(device: torch.device) -> str:

@@ -136,6 +136,13 @@ def autocast(device: torch.device) -> torch.autocast:
     return torch.autocast(device.type, torch.bfloat16, enabled=bool(supported))
 
 
+def arithmetic(device: torch.device) -> torch.dtype:
+    """Type that a network's weights are multiplied in on `device`, see `autocast`."""
+    with autocast(device):
+        enabled = torch.is_autocast_enabled(device.type)
+        return torch.get_autocast_dtype(device.type) if enabled else torch.float32
+
+
 @torch.inference_mode()
 def multiply_accumulates(network: nn.Module, features: Tensor) -> int:
     """Multiply-accumulate operations of the convolutions for `features` [1, C, H, W]."""

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from unwrap.correction import Merge, SensorDescription, correct
 from unwrap.data import GRAY_FULL_SCALE
+from unwrap.inference import prepared
 from unwrap.network import Network, Prediction, autocast, multiply_accumulates
 from unwrap.phase import unambiguous_range_m
 from unwrap.sensed import Sensed, mapped
@@ -44,6 +45,7 @@ class Unwrapper:
     network: Network = field(repr=False)
     metadata: dict = field(repr=False)
     fingerprint: str
+    _ready: dict[torch.device, Network] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def unambiguous_m(self) -> float:
@@ -112,11 +114,14 @@ class Unwrapper:
             raise ValueError(f"f1_hz is {sensor.f1_hz:g}; {trained}")
 
     def _predicted(self, sensed: Sensed, sensor: SensorDescription) -> Prediction:
-        stride = self.stride(*sensed.gray.shape[-2:])
+        device = sensed.gray.device
+        if device not in self._ready:
+            self._ready[device] = prepared(self.network, device)
+        network, stride = self._ready[device], self.stride(*sensed.gray.shape[-2:])
         shown = thinned(sensed, stride)
-        with autocast(sensed.gray.device):
-            output = self.network(self.network.features(shown, sensor))
-        prediction = self.network.predict(output, shown, sensor)
+        with autocast(device):
+            output = network(network.features(shown, sensor))
+        prediction = network.predict(output, shown, sensor)
         return restored(prediction, sensed, sensor, stride, self.network.needs)
 
     def macs(self, height: int, width: int) -> int:
