@@ -21,7 +21,7 @@ from unwrap.fusion import measured
 from unwrap.network import Needs, Prediction
 from unwrap.phase import unambiguous_range_m
 from unwrap.sensed import Sensed
-from unwrap.sizes import restored, thinned
+from unwrap.sizes import predicted
 from unwrap.unwrapper import Unwrapper
 
 OPSET = 20
@@ -54,10 +54,7 @@ class Exported(nn.Module):
         In float32 wherever it runs, so that a file does not depend on the machine that wrote it.
         """
         stride = self.stride(*sensed.gray.shape[-2:])
-        shown = thinned(sensed, stride)
-        output = self.network(self.network.features(shown, self.sensor))
-        prediction = self.network.predict(output, shown, self.sensor)
-        return restored(prediction, sensed, self.sensor, stride, self.network.needs)
+        return predicted(self.network, sensed, self.sensor, stride, exact=True)
 
     def merged(self, predicted_m: Tensor, wrapped_m: Tensor) -> Tensor:
         """Wrapped distance with the wraps that the prediction tells, all [1, H, W] in metres."""

@@ -197,9 +197,8 @@ class TofFusionNet(Autoencoder):
         with autocast(sensed.gray.device):
             output = self(self.features(sensed, sensor))
         wrapped_m, signal = measured(sensed, sensor)
-        logits = candidate_scores(
-            self.parts(output, wrapped_m)[0], wrapped_m, self.settings.unambiguous_m
-        )
+        scores = output[:, :-VECTOR]
+        logits = candidate_scores(scores, wrapped_m, self.settings.unambiguous_m)
         wraps = own_wraps(truth.distance_m, wrapped_m, self.settings)
         told = signal & truth.known & (truth.distance_m < self.settings.range_m)
         step = max(1, int(told.sum()) // CALIBRATION_PIXELS)

@@ -8,6 +8,7 @@ therefore thinned to them, and the prediction is brought back.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from typing import Any
 
 from torch import Tensor
@@ -16,7 +17,7 @@ from torch.nn import functional
 from unwrap.correction import SensorDescription
 from unwrap.fusion import measured
 from unwrap.merge import nearest_wraps
-from unwrap.network import Needs, Prediction
+from unwrap.network import Needs, Network, Prediction, autocast
 from unwrap.phase import unambiguous_range_m
 from unwrap.sensed import Sensed, mapped
 
@@ -95,3 +96,17 @@ def restored(
         wraps = nearest_wraps(distance_m, wrapped_m, unambiguous_m)
         distance_m = (wrapped_m + wraps * unambiguous_m).where(signal, distance_m)
     return Prediction(distance_m, confidence)
+
+
+def predicted(
+    network: Network, sensed: Sensed, sensor: SensorDescription, stride: int, *, exact: bool = False
+) -> Prediction:
+    """What a network makes of frames that are thinned for it, at their own size.
+
+    `exact` computes in float32 wherever it runs, else in the type that is quickest there.
+    """
+    shown = thinned(sensed, stride)
+    with nullcontext() if exact else autocast(sensed.gray.device):
+        output = network(network.features(shown, sensor))
+    prediction = network.predict(output, shown, sensor)
+    return restored(prediction, sensed, sensor, stride, network.needs)

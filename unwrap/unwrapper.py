@@ -11,10 +11,10 @@ from torch import Tensor
 from unwrap.correction import Merge, SensorDescription, correct
 from unwrap.data import GRAY_FULL_SCALE
 from unwrap.inference import prepared
-from unwrap.network import Network, Prediction, autocast, multiply_accumulates
+from unwrap.network import Network, Prediction, multiply_accumulates
 from unwrap.phase import unambiguous_range_m
 from unwrap.sensed import Sensed, mapped
-from unwrap.sizes import restored, stride_to, thinned, trained_size
+from unwrap.sizes import predicted, stride_to, trained_size
 from unwrap.weights import load_weights
 from unwrap.zoo import NAMES
 
@@ -117,12 +117,8 @@ class Unwrapper:
         device = sensed.gray.device
         if device not in self._ready:
             self._ready[device] = prepared(self.network, device)
-        network, stride = self._ready[device], self.stride(*sensed.gray.shape[-2:])
-        shown = thinned(sensed, stride)
-        with autocast(device):
-            output = network(network.features(shown, sensor))
-        prediction = network.predict(output, shown, sensor)
-        return restored(prediction, sensed, sensor, stride, self.network.needs)
+        stride = self.stride(*sensed.gray.shape[-2:])
+        return predicted(self._ready[device], sensed, sensor, stride)
 
     def macs(self, height: int, width: int) -> int:
         """Multiply-accumulate operations of one frame of `height` x `width` pixels.
