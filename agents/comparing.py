@@ -15,7 +15,7 @@ from agents.comparison import Training
 from shotenv.sensed import SensedFrames
 from unwrap.acquisition import Shots
 from unwrap.correction import SensorDescription
-from unwrap.data import acquiring_threads, in_order, loader
+from unwrap.data import acquiring_threads, in_order, loader, on_device
 from unwrap.evaluate import score
 from unwrap.inputs import samples_of
 from unwrap.peers.amplitude import unwrap_amplitude
@@ -151,9 +151,7 @@ def classical_methods(
 def _prior(frames: SensedFrames, shots: Shots, device: torch.device) -> ReflectancePrior:
     orders = in_order(frames, CALIBRATION_BATCH, (shots,), draw=CALIBRATION_DRAW)
     batches = loader(frames, orders, threads=acquiring_threads(device))
-    return calibrate(
-        ((moved(sensed, device), moved(truth, device)) for sensed, truth in batches), frames.sensor
-    )
+    return calibrate((on_device(batch, device) for batch in batches), frames.sensor)
 
 
 @torch.inference_mode()
@@ -180,11 +178,11 @@ def rows_of(
         of_shots = [tally for (_, its), tally in tallies.items() if its == shots]
         orders = in_order(frames, SCORED_AT_ONCE[device.type], (shots,), draw=JUDGED_DRAW)
         batches = loader(frames, orders, threads=acquiring_threads(device))
-        for order, (sensed, truth) in zip(orders, batches, strict=True):
-            scored = frames.scored(order.numbers, draw=JUDGED_DRAW) & truth.known
-            shown, truth_m = moved(sensed, device), truth.distance_m.to(device)
+        for order, batch in zip(orders, batches, strict=True):
+            sensed, truth = on_device(batch, device)
+            scored = frames.scored(order.numbers, draw=JUDGED_DRAW).to(device) & truth.known
             for tally in of_shots:
-                tally.judge(shown, order.numbers, truth_m, scored.to(device))
+                tally.judge(sensed, order.numbers, truth.distance_m, scored)
             tick(len(sensed))
     return [
         {"method": method.label, "shots": int(shots), "merge": method.merge, **tally.means()}
@@ -208,18 +206,17 @@ class _Tally:
         self, sensed: Sensed, numbers: Sequence[int], truth_m: Tensor, scored: Tensor
     ) -> None:
         """Let the method look at frames [B], all at once unless it remembers, and score them."""
+        places = [slice(place, place + 1) for place in range(len(numbers))]
         if self._method.remembers:
-            for place, number in enumerate(numbers):
-                shown = mapped(itemgetter(slice(place, place + 1)), sensed)
-                shown = replace(shown, memory=self._memory(number))
+            for place, number in zip(places, numbers, strict=True):
+                shown = replace(mapped(itemgetter(place), sensed), memory=self._memory(number))
                 self._last = self._method.look(shown, self._frames.sensor)
                 self._add(self._last, truth_m[place], scored[place])
             return
         shown = sensed if sensed.memory is None else replace(sensed, memory=None)
         estimate = self._method.look(shown, self._frames.sensor)
-        for place in range(len(numbers)):
-            one = mapped(itemgetter(slice(place, place + 1)), estimate)
-            self._add(one, truth_m[place], scored[place])
+        for place in places:
+            self._add(mapped(itemgetter(place), estimate), truth_m[place], scored[place])
 
     def _memory(self, number: int) -> Memory | None:
         """What the method remembers of the frame before; nothing at the start of a clip."""
@@ -231,8 +228,7 @@ class _Tally:
         return moved(self._frames.moved(seen_m.cpu(), [number]), seen_m.device)
 
     def _add(self, estimate: Estimate, truth_m: Tensor, scored: Tensor) -> None:
-        """Score one frame, of truth [H, W]; depth that is missing counts as 0."""
-        truth_m, scored = truth_m[None], scored[None]
+        """Score one frame [1, H, W]; depth that is missing counts as 0."""
         depth_m = estimate.depth_m.nan_to_num(0.0)
         range_m = self._frames.sensor.max_range_m
         half_m = self._unambiguous_m / 2

@@ -16,7 +16,7 @@ from torch.utils.data import DataLoader, Dataset, Sampler
 
 from unwrap.acquisition import Shots
 from unwrap.correction import SensorDescription
-from unwrap.sensed import Sensed, Truth, mapped
+from unwrap.sensed import Sensed, Truth, mapped, moved
 
 SplitBy = Literal["clip", "frame"]
 GRAY_FULL_SCALE = 4095
@@ -207,6 +207,12 @@ class AcquiredAhead:
             return batch
         sensed, truth = batch
         return mapped(Tensor.pin_memory, sensed), mapped(Tensor.pin_memory, truth)
+
+
+def on_device(batch: Batch, device: torch.device) -> Batch:
+    """The batch on `device`; from memory that a GPU copies from by itself without waiting."""
+    sensed, truth = batch
+    return moved(sensed, device), moved(truth, device)
 
 
 def training_device() -> torch.device:

@@ -31,12 +31,13 @@ from unwrap.data import (
     acquiring_threads,
     in_order,
     loader,
+    on_device,
     training_device,
 )
 from unwrap.files import write_json
 from unwrap.merge import nearest_wraps
 from unwrap.network import Prediction, autocast
-from unwrap.sensed import Sensed, Truth, moved
+from unwrap.sensed import Sensed, Truth
 from unwrap.train_config import TrainConfig
 from unwrap.weights import save_weights
 
@@ -107,7 +108,7 @@ class TrainingModule(lightning.LightningModule):
         self, batch: Batch, device: torch.device, dataloader_idx: int
     ) -> Batch:
         """Lightning does not know how to move frozen dataclasses."""
-        return _moved(batch, device)
+        return on_device(batch, device)
 
     def _seed_of(self, stream: int) -> int:
         """One 63-bit seed for a purpose in this step."""
@@ -145,11 +146,6 @@ class TrainingModule(lightning.LightningModule):
                 "the checkpoint was made with another configuration; start afresh with "
                 "resume=False, or write to another folder"
             )
-
-
-def _moved(batch: Batch, device: torch.device) -> Batch:
-    sensed, truth = batch
-    return moved(sensed, device), moved(truth, device)
 
 
 def wrap_hits(predicted_m: Tensor, truth_m: Tensor, config: TrainConfig) -> tuple[Tensor, Tensor]:
@@ -213,7 +209,7 @@ def train(
             weights_only=True,
         )
     module.eval().to(device)
-    module.network.calibrate((_moved(batch, device) for batch in judging), validation.sensor)
+    module.network.calibrate((on_device(batch, device) for batch in judging), validation.sensor)
     return _write(module, sources("test"), out)
 
 
@@ -299,7 +295,7 @@ def measure(module: TrainingModule, source: Source) -> dict[str, Any]:
     judging = loader(source, orders, threads=acquiring_threads(device))
     sums: dict[str, Tensor] = {}
     for order, batch in zip(orders, judging, strict=True):
-        sensed, truth = _moved(batch, device)
+        sensed, truth = on_device(batch, device)
         counts = _counts(module.predict(sensed).distance_m, truth, config)
         for key in (source.families[order.numbers[0]], "all"):
             sums[key] = sums.get(key, torch.zeros(4, dtype=torch.float64)) + counts
