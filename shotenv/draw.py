@@ -66,7 +66,7 @@ def frame_panels(problem: Problem, state: State, shots: int) -> dict[str, np.nda
         )
         wrapped_m = distance_m(first.phase_rad[0], sensor.f1_hz)
         corrected_m = torch.where(made.depth.valid[0], made.depth.distance_m[0], torch.nan)
-        error_m = torch.where(made.scored[0] > 0, (corrected_m - truth_m).abs(), torch.nan)
+        error_m = torch.where(made.scored[0], (corrected_m - truth_m).abs(), torch.nan)
     return {
         "gray": grayscale(gray),
         "wrapped": colours(wrapped_m, unambiguous_range_m(sensor.f1_hz)),

@@ -5,28 +5,30 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from shotenv.compiled import array, loop
 from shotenv.drive import Drive
 from shotenv.observe import SEEN_FEATURES
 from shotenv.problem import Problem
-from shotenv.reward import DepthScore, frame_sums, score_maps, score_of
+from shotenv.reward import DepthScore, score_depth
 from shotenv.sensor import (
-    Electrons,
     acquire,
-    charge,
-    collect,
     noise_samples,
     sample_noise_lsb,
-    single_sample_snr,
+    scored_pixels,
+    sensitivity,
 )
 from unwrap.acquisition import Shots
-from unwrap.correction import correct_and_weigh
+from unwrap.correction import correct
 from unwrap.data import GRAY_FULL_SCALE
 from unwrap.frames import DepthFrame, RawFrame
-from unwrap.phase import unambiguous_range_m
 from unwrap.sensed import Sensed
+
+Array = np.ndarray
+FOUR, ONE_M = np.float32(4.0), np.float32(1.0)
 
 
 @dataclass(frozen=True)
@@ -39,13 +41,12 @@ class Acquisition:
         Samples and corrected depth.
     predicted_m, noise_lsb, truth_m : float32 [B, H, W]
         The network's distance, the sensor's own estimate of a sample's noise, the truth.
-    valid, scored : float32 [B, H, W]
-        1 where the depth is valid, and where the pixel counts, else 0.
+    scored : bool [B, H, W]
+        Where the pixel counts.
     """
 
     raw: RawFrame
     depth: DepthFrame
-    valid: Tensor
     predicted_m: Tensor
     noise_lsb: Tensor
     truth_m: Tensor
@@ -95,15 +96,15 @@ def acquire_depth(
     if noise is None:
         noise = noise_of(drive, step, bank.height, bank.width)
     exposure = bank.exposure(frames)
-    electrons = undiminished = charge(exposure, sensor, drive.sensitivity)
+    per_light = drive.sensitivity
     if power_w is not None:
-        electrons = collect(exposure, sensor, power_w, drive.integration_s)
-    raw = acquire(electrons, sensor, shots=shots, noise=noise, offsets=drive.offsets)
+        per_light = sensitivity(sensor, power_w, drive.integration_s)
+    raw = acquire(exposure, per_light, sensor, shots=shots, noise=noise, offsets=drive.offsets)
     noise_lsb = sample_noise_lsb(
         bank.gray(frames), problem.gray_exposure_s.take(frames), drive.integration_s, sensor
     )
     predicted_m = predict(problem, drive, frames, raw, noise_lsb)
-    depth, valid = correct_and_weigh(
+    depth = correct(
         raw,
         predicted_m,
         problem.description,
@@ -113,8 +114,8 @@ def acquire_depth(
         noise_lsb=noise_lsb,
         shift_m=drive.drift_m,
     )
-    scored = scored_pixels(undiminished, exposure.distance_m, problem)
-    return Acquisition(raw, depth, valid, predicted_m, noise_lsb, exposure.distance_m, scored)
+    scored = scored_pixels(exposure, drive.sensitivity, sensor)
+    return Acquisition(raw, depth, predicted_m, noise_lsb, exposure.distance_m, scored)
 
 
 def predict(
@@ -137,14 +138,6 @@ def predict(
     return problem.fusion.look(sensed, problem.description).distance_m
 
 
-def scored_pixels(electrons: Electrons, truth_m: Tensor, problem: Problem) -> Tensor:
-    """Pixels that count, 1 or 0: truth within the range, single-sample signal to noise enough."""
-    sensor = problem.config.sensor
-    strong = single_sample_snr(electrons, sensor).gt_(sensor.min_snr)
-    # A comparison into float32 is vectorised; into a bool it is not.
-    return torch.le(truth_m, sensor.max_range_m, out=torch.empty_like(truth_m)).mul_(strong)
-
-
 def measure(
     problem: Problem,
     drive: Drive,
@@ -156,41 +149,63 @@ def measure(
 ) -> Measured:
     """Acquire, correct and score the frames at `step` [B] of `drive`; see `acquire_depth`."""
     made = acquire_depth(problem, drive, step, shots, power_w, noise=noise)
-    scored = score_maps(
+    score = score_depth(
         made.depth.distance_m,
-        made.valid,
+        made.depth.valid,
         made.truth_m,
         made.scored,
         error_scale_m=problem.config.reward.error_scale_m,
-        unambiguous_m=unambiguous_range_m(problem.config.sensor.f1_hz),
+        unambiguous_m=made.depth.unambiguous_m,
+        range_m=problem.config.sensor.max_range_m,
     )
-    sums = frame_sums(*scored, *seen_maps(made, shots))
-    count, pixels = len(scored), problem.bank.height * problem.bank.width
-    score = score_of(sums, problem.config.sensor.max_range_m)
-    return Measured(score, seen_of(sums[count:], pixels))
+    return Measured(score, seen_of(made, shots))
 
 
-def seen_maps(made: Acquisition, shots: Shots) -> list[Tensor]:
-    """What the sensor can tell of each pixel without the truth, 4, 5 or 6 maps [B, H, W]."""
-    amplitude, residual = made.depth.amplitude, made.depth.residual
-    maps = [amplitude, _above_noise(amplitude, made.noise_lsb), made.valid, made.raw.saturation]
-    if residual is not None:
-        maps.append(_above_noise(residual, made.noise_lsb))
-    if shots == Shots.EIGHT:
-        apart_m = (made.depth.distance_m - made.predicted_m).abs_()
-        maps.append((apart_m / (apart_m + 1.0)).mul_(made.valid))
-    return maps
+def seen_of(made: Acquisition, shots: Shots) -> Tensor:
+    """What the sensor can tell without the truth, float32 [B, 4, 5 or 6]; see `SEEN_FEATURES`."""
+    depth, told = made.depth, {Shots.TWO: 4, Shots.FOUR: 5, Shots.EIGHT: 6}[shots]
+    seen = np.empty((len(depth.distance_m), len(SEEN_FEATURES)), np.float32)
+    _see(
+        array(depth.amplitude),
+        array(depth.amplitude if depth.residual is None else depth.residual),
+        array(made.noise_lsb),
+        array(depth.valid, np.bool_),
+        array(made.raw.saturated, np.bool_),
+        array(depth.distance_m),
+        array(made.predicted_m),
+        seen,
+    )
+    return torch.from_numpy(seen)[:, :told]
 
 
-def seen_of(sums: Tensor, pixels: int) -> Tensor:
-    """Features float32 [B, 4, 5 or 6] of the sums of `seen_maps` over frames of `pixels` pixels."""
-    seen = sums / pixels
-    seen[0].log1p_().div_(6.9)
-    if len(sums) == len(SEEN_FEATURES):
-        torch.div(sums[5], sums[2].clamp(min=1), out=seen[5])
-    return seen.T.to(torch.float32)
-
-
-def _above_noise(signal_lsb: Tensor, noise_lsb: Tensor) -> Tensor:
-    """q / (q + 1), 0..1, where q is the signal over 4 sigma."""
-    return signal_lsb / torch.add(signal_lsb, noise_lsb, alpha=4.0)
+@loop
+def _see(
+    amplitude_lsb: Array,
+    residual_lsb: Array,
+    noise_lsb: Array,
+    valid: Array,
+    saturated: Array,
+    distance_m: Array,
+    predicted_m: Array,
+    seen: Array,
+) -> None:
+    """`SEEN_FEATURES`, float32 [B, 6], of maps [B, H, W]; summed by columns, as scores are."""
+    frames, rows, columns = valid.shape
+    for b in range(frames):
+        sums = np.zeros((6, columns))
+        for i in range(rows):
+            for j in range(columns):
+                four_sigma_lsb = FOUR * noise_lsb[b, i, j]
+                amplitude, residual = amplitude_lsb[b, i, j], residual_lsb[b, i, j]
+                apart_m = abs(distance_m[b, i, j] - predicted_m[b, i, j])
+                good = np.float32(valid[b, i, j])
+                sums[0, j] += amplitude
+                sums[1, j] += amplitude / (amplitude + four_sigma_lsb)
+                sums[2, j] += good
+                sums[3, j] += np.float32(saturated[b, i, j])
+                sums[4, j] += residual / (residual + four_sigma_lsb)
+                sums[5, j] += good * apart_m / (apart_m + ONE_M)
+        for k in range(1, 5):
+            seen[b, k] = sums[k].sum() / (rows * columns)
+        seen[b, 0] = np.log1p(sums[0].sum() / (rows * columns)) / 6.9
+        seen[b, 5] = sums[5].sum() / max(sums[2].sum(), 1.0)

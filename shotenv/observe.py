@@ -12,7 +12,6 @@ from torch import Tensor
 from shotenv.bank import Bank, Clip
 from shotenv.config import SensorConfig
 from shotenv.predictions import KeptPredictions
-from shotenv.reward import frame_sums
 from shotenv.sensor import electrons_per_radiance_second
 from shotenv.sensor.converter import full_scale_lsb
 from shotenv.sensor.gray import gray_gain_lsb_per_e
@@ -121,26 +120,31 @@ def _scene(
     prediction = kept.of(frames)
     beyond = prediction.distance_m > unambiguous_range_m(sensor.f1_hz)
     middle = gray.shape[1] // 2
-    mean = _mean(gray)
+    mean = frame_means(gray)
     columns = (
         mean,
-        2 * _mean((gray - mean[:, None, None].to(gray.dtype)) ** 2).sqrt(),
-        _mean((gray < 0.05).to(gray.dtype)),
-        _mean((gray > 0.8).to(gray.dtype)),
-        20 * _mean((gray[:, :, 1:] - gray[:, :, :-1]).abs()),
-        _mean(gray[:, :middle]) - _mean(gray[:, middle:]),
+        2 * frame_means((gray - mean[:, None, None].to(gray.dtype)) ** 2).sqrt(),
+        frame_means((gray < 0.05).to(gray.dtype)),
+        frame_means((gray > 0.8).to(gray.dtype)),
+        20 * frame_means((gray[:, :, 1:] - gray[:, :, :-1]).abs()),
+        frame_means(gray[:, :middle]) - frame_means(gray[:, middle:]),
         (grid.mean(dim=1) + 1.5) / 2.5,
-        _mean(prediction.distance_m) / sensor.max_range_m,
-        _mean(prediction.confidence),
-        _mean(beyond.to(gray.dtype)),
+        frame_means(prediction.distance_m) / sensor.max_range_m,
+        frame_means(prediction.confidence),
+        frame_means(beyond.to(gray.dtype)),
         torch.from_numpy(bank.ego_speed_m_s)[frames] / 15.0,
         torch.from_numpy(bank.yaw_rate_rad_s)[frames] / 0.5,
     )
     return torch.stack([column.to(torch.float32) for column in columns], dim=1), grid
 
 
-def _mean(maps: Tensor) -> Tensor:
-    return frame_sums(maps)[0] / (maps.shape[1] * maps.shape[2])
+def frame_means(maps: Tensor) -> Tensor:
+    """Mean of each of the maps [B, H, W], float64 [B].
+
+    Row by row, because a sum over a whole frame at once is split among threads, and then its
+    last bit depends on how many there are.
+    """
+    return maps.sum(dim=-1).sum(dim=-1, dtype=torch.float64) / (maps.shape[1] * maps.shape[2])
 
 
 def _log_ambient(gray: Tensor, exposure_s: Tensor, sensor: SensorConfig) -> Tensor:

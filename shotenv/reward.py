@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from shotenv.compiled import array, loop
 from shotenv.config import RewardConfig
 from shotenv.frames import ShotCost
-from unwrap.merge import below
+
+Array = np.ndarray
 
 TERMS = ("error", "duty", "power", "tripped")
 """Order of the reward terms, also in `info["vector_reward"]`; each lies in 0..1."""
@@ -44,19 +46,7 @@ class DepthScore:
     valid_share: Tensor
 
 
-def frame_sums(*maps: Tensor) -> Tensor:
-    """Sum of each frame of each of the maps [B, H, W], float64 [len(maps), B].
-
-    Row by row, because a sum over a whole frame at once is split among threads, and then its
-    last bit depends on how many there are.
-    """
-    rows = maps[0].new_empty(len(maps), *maps[0].shape[:-1])
-    for row, values in zip(rows.unbind(0), maps, strict=True):
-        torch.sum(values, dim=-1, out=row)
-    return rows.sum(dim=-1, dtype=torch.float64)
-
-
-FARTHEST_ERROR_M = 1e9
+FARTHEST_ERROR_M = np.float32(1e9)
 """Stands for the error where there is no distance: its term is 1 within the rounding of a float."""
 
 
@@ -70,60 +60,59 @@ def score_depth(
     unambiguous_m: float,
     range_m: float,
 ) -> DepthScore:
-    """Score depth [B, H, W] against the truth over the pixels `scored`.
-
-    `valid` and `scored` are bool, or float with 0 and 1 (float masks are several times faster).
-    """
-    counted, good = scored.to(distance_m.dtype), valid.to(distance_m.dtype)
-    maps = score_maps(
-        distance_m,
-        good,
-        truth_m,
-        counted,
-        error_scale_m=error_scale_m,
-        unambiguous_m=unambiguous_m,
+    """Score depth float32 [B, H, W] against the truth over the pixels `scored`, bool [B, H, W]."""
+    score = np.empty((5, len(distance_m)))
+    _score(
+        array(distance_m),
+        array(valid, np.bool_),
+        array(truth_m),
+        array(scored, np.bool_),
+        np.float32(error_scale_m),
+        np.float32(0.5 * unambiguous_m),
+        range_m,
+        score,
     )
-    return score_of(frame_sums(*maps), range_m)
+    return DepthScore(*torch.from_numpy(score).unbind())
 
 
-def score_maps(
-    distance_m: Tensor,
-    valid: Tensor,
-    truth_m: Tensor,
-    scored: Tensor,
-    *,
-    error_scale_m: float,
-    unambiguous_m: float,
-) -> tuple[Tensor, ...]:
-    """What a score sums over each frame, six maps [B, H, W]; `valid` and `scored` are 0 and 1.
+@loop
+def _score(
+    distance_m: Array,
+    valid: Array,
+    truth_m: Array,
+    scored: Array,
+    scale_m: np.float32,
+    near_m: np.float32,
+    range_m: float,
+    score: Array,
+) -> None:
+    """The fields of a score, float64 [5, B], of maps [B, H, W].
 
-    In the order of `DepthScore` numerators, in metres where they are errors; and `scored`.
+    Sums go column by column first: neighbours are summed side by side, in an order that does not
+    depend on the processor.
     """
-    good = valid * scored
-    error_m = (distance_m - truth_m).abs_()
-    error_m = error_m.nan_to_num_(FARTHEST_ERROR_M, FARTHEST_ERROR_M)
-    good_error_m = error_m * good
-    bounded = (error_m * scored).div_(error_m + error_scale_m)
-    right = below(error_m, 0.5 * unambiguous_m).mul_(good)
-    return bounded, good_error_m, error_m.mul_(good_error_m), right, good, scored
-
-
-DIVISORS = torch.tensor([5, 4, 4, 5, 5])
-"""Which of the six sums each of the others is divided by."""
-
-
-def score_of(sums: Tensor, range_m: float) -> DepthScore:
-    """Score of sums [6 or more, B], of which the first six are those of `score_maps`."""
-    counts = sums.index_select(0, DIVISORS)
-    means = sums[:5] / counts.clamp(min=1)
-    means[2].sqrt_()
-    return DepthScore(*torch.where(counts == 0, _nothing_counted(range_m), means).unbind())
-
-
-@lru_cache(maxsize=16)
-def _nothing_counted(range_m: float) -> Tensor:
-    """Score, float64 [5, 1], where there is no pixel to count."""
-    return torch.tensor([[0.0], [range_m], [range_m], [1.0], [1.0]], dtype=torch.float64)
+    frames, rows, columns = distance_m.shape
+    for b in range(frames):
+        sums = np.zeros((6, columns))
+        for i in range(rows):
+            for j in range(columns):
+                error_m = abs(distance_m[b, i, j] - truth_m[b, i, j])
+                if not error_m < FARTHEST_ERROR_M:
+                    error_m = FARTHEST_ERROR_M
+                counts = np.float32(scored[b, i, j])
+                good = counts * np.float32(valid[b, i, j])
+                sums[0, j] += counts * error_m / (error_m + scale_m)
+                sums[1, j] += good * error_m
+                sums[2, j] += good * error_m * error_m
+                sums[3, j] += good * np.float32(error_m < near_m)
+                sums[4, j] += good
+                sums[5, j] += counts
+        all_valid, all_scored = sums[4].sum(), sums[5].sum()
+        score[0, b] = sums[0].sum() / all_scored if all_scored else 0.0
+        score[1, b] = sums[1].sum() / all_valid if all_valid else range_m
+        score[2, b] = np.sqrt(sums[2].sum() / all_valid) if all_valid else range_m
+        score[3, b] = sums[3].sum() / all_scored if all_scored else 1.0
+        score[4, b] = all_valid / all_scored if all_scored else 1.0
 
 
 def no_depth(batch: int, range_m: float) -> DepthScore:

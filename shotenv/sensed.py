@@ -19,10 +19,9 @@ from shotenv.problem import check_fits, describe
 from shotenv.sensor import (
     Purpose,
     acquire,
-    collect,
     noise_samples,
     sample_noise_lsb,
-    single_sample_snr,
+    scored_pixels,
     stream_seed,
 )
 from unwrap.acquisition import Shots
@@ -101,11 +100,9 @@ class SensedFrames:
 
     def scored(self, numbers: Sequence[int], *, draw: int) -> Tensor:
         """Pixels that count, bool [B, H, W]: truth within the range, signal to noise enough."""
-        frames, sensor = self.frames[list(numbers)], self._config.sensor
-        exposure, drive = self._exposure(frames), self._drives(frames, draw)
-        electrons = collect(exposure, sensor, drive.laser_power_w, drive.integration_s)
-        strong = single_sample_snr(electrons, sensor) > sensor.min_snr
-        return strong & (exposure.distance_m <= sensor.max_range_m)
+        frames = self.frames[list(numbers)]
+        drive = self._drives(frames, draw)
+        return scored_pixels(self._exposure(frames), drive.sensitivity, self._config.sensor)
 
     def follows(self, number: int) -> bool:
         """Whether the frame at `number` comes right after the one at `number - 1`, in a clip."""
@@ -156,11 +153,17 @@ class SensedFrames:
         exposure, drive = self._exposure(frames), self._drives(frames, draw)
         places = (frames - self._starts(frames)).tolist()
         noise = noise_samples(drive.seed.tolist(), places, *gray.shape[-2:])
-        electrons = collect(exposure, sensor, drive.laser_power_w, drive.integration_s)
         exposure_s = torch.from_numpy(self.bank.gray_exposure_s)[frames]
         return Sensed(
             gray=gray,
-            raw=acquire(electrons, sensor, shots=shots, noise=noise, offsets=drive.offsets),
+            raw=acquire(
+                exposure,
+                drive.sensitivity,
+                sensor,
+                shots=shots,
+                noise=noise,
+                offsets=drive.offsets,
+            ),
             offset_lsb=drive.offsets.calibrated_lsb,
             noise_lsb=sample_noise_lsb(words, exposure_s, drive.integration_s, sensor),
             shift_m=drive.drift_m,

@@ -13,10 +13,10 @@ from shotenv.config import RewardConfig
 from shotenv.core import observe, open_problem, outcomes_of_all_actions, reset, step
 from shotenv.drive import draw_frames
 from shotenv.frames import ShotCost
-from shotenv.observe import FEATURES, LIMIT
+from shotenv.observe import FEATURES, LIMIT, frame_means
 from shotenv.predictions import keep_predictions
 from shotenv.resolve import env_config
-from shotenv.reward import TERMS, frame_sums, no_depth, reward, reward_terms, score_depth
+from shotenv.reward import TERMS, no_depth, reward, reward_terms, score_depth
 from unwrap.unwrapper import load_unwrapper
 
 
@@ -80,15 +80,37 @@ def test_reward_is_minus_the_weighted_terms():
     assert reward(terms, weights).item() == pytest.approx(-(2.0 + 0.1 + 0.2 + 0.3))
 
 
-def test_sums_are_the_same_on_any_number_of_threads():
+def test_means_are_the_same_on_any_number_of_threads():
     maps = torch.rand(3, 240, 320, generator=torch.Generator().manual_seed(0))
     threads = torch.get_num_threads()
-    sums = []
+    means = []
     for count in (1, 2):
         torch.set_num_threads(count)
-        sums += [frame_sums(maps)[0], torch.cat([frame_sums(one[None])[0] for one in maps])]
+        means += [frame_means(maps), torch.cat([frame_means(one[None]) for one in maps])]
     torch.set_num_threads(threads)
-    assert all(torch.equal(sums[0], other) for other in sums)
+    assert all(torch.equal(means[0], other) for other in means)
+
+
+def test_scores_are_those_of_a_slow_loop_over_the_batch():
+    generator = torch.Generator().manual_seed(1)
+    truth = 30 * torch.rand(3, 24, 32, generator=generator)
+    distance = truth + 4 * torch.randn(truth.shape, generator=generator)
+    valid, counted = torch.rand(2, *truth.shape, generator=generator) > 0.2
+    found = score_depth(
+        distance, valid, truth, counted, error_scale_m=0.5, unambiguous_m=6.25, range_m=25.0
+    )
+    for b in range(3):
+        errors = (distance[b] - truth[b]).abs().double()
+        good = counted[b] & valid[b]
+        bounded = (errors / (errors + 0.5))[counted[b]].mean()
+        assert found.error[b].item() == pytest.approx(bounded.item(), rel=1e-6)
+        assert found.depth_mae_m[b].item() == pytest.approx(errors[good].mean().item(), rel=1e-6)
+        squares = errors[good].square().mean().sqrt()
+        assert found.depth_rmse_m[b].item() == pytest.approx(squares.item(), rel=1e-6)
+        right = (good & (errors < 3.125)).sum() / counted[b].sum()
+        assert found.wrap_accuracy[b].item() == pytest.approx(right.item(), rel=1e-6)
+        share = good.sum() / counted[b].sum()
+        assert found.valid_share[b].item() == pytest.approx(share.item(), rel=1e-6)
 
 
 def test_rows_of_nested_values():

@@ -21,7 +21,7 @@ from shotenv.sensor import (
     stream,
     stream_seed,
 )
-from shotenv.sensor.converter import digitise
+from shotenv.sensor.pixels import word_lsb
 from unwrap.acquisition import Shots, demodulation_phase_rad, frequency_index
 
 C_M_S = 299_792_458.0
@@ -116,7 +116,8 @@ def test_converter_rounds_and_clips(sensor):
     raw = noise_free(wall(sensor, 0.0, radiance=0.01), loud)
     assert raw.dcs_lsb.min() == -2048 and raw.dcs_lsb.max() == 2047
     assert raw.saturated.all()
-    assert digitise(torch.tensor([0.5, 1.5, -0.5, 7.2]), -2.0, 5.0).tolist() == [0.0, 2.0, 0.0, 5.0]
+    analogue = (0.5, 1.5, -0.5, 7.2)
+    assert [word_lsb(value, -2.0, 5.0) for value in analogue] == [0.0, 2.0, 0.0, 5.0]
 
 
 def test_ambient_light_alone_gives_nothing_but_row_parity(sensor):

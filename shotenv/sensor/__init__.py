@@ -1,14 +1,11 @@
 """Light becomes electrons, noise and converter words."""
 
 from shotenv.sensor.acquire import (
-    Electrons,
     Sensitivity,
     acquire,
-    charge,
-    collect,
     expose,
+    scored_pixels,
     sensitivity,
-    single_sample_snr,
 )
 from shotenv.sensor.drift import distance_drift_m, imager_temperature_k, residual_drift_m
 from shotenv.sensor.electrons import electrons_per_radiance_second
@@ -17,14 +14,11 @@ from shotenv.sensor.noise import Purpose, draw_noise, noise_samples, stream, str
 from shotenv.sensor.offsets import OffsetPattern, draw_offsets
 
 __all__ = [
-    "Electrons",
     "OffsetPattern",
     "Purpose",
     "Sensitivity",
     "acquire",
     "capture_gray",
-    "charge",
-    "collect",
     "distance_drift_m",
     "draw_noise",
     "draw_offsets",
@@ -34,8 +28,8 @@ __all__ = [
     "noise_samples",
     "residual_drift_m",
     "sample_noise_lsb",
+    "scored_pixels",
     "sensitivity",
-    "single_sample_snr",
     "stream",
     "stream_seed",
 ]

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import repeat
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from shotenv.compiled import array
 from shotenv.config import SensorConfig
 from shotenv.frames import Exposure
-from shotenv.sensor.converter import digitise, signed_limits_lsb
-from shotenv.sensor.electrons import (
-    add_noise,
-    clip_to_full_well,
-    electrons_per_radiance_second,
-    keep_positive,
-    tap_packets,
-)
-from shotenv.sensor.offsets import OffsetPattern, add_ambient_offset
+from shotenv.sensor.converter import signed_limits_lsb
+from shotenv.sensor.electrons import electrons_per_radiance_second
+from shotenv.sensor.offsets import OffsetPattern
+from shotenv.sensor.pixels import Light, Pixel, strong_pixels, take_sample
 from unwrap.acquisition import Shots
 from unwrap.frames import RawFrame
 
@@ -60,32 +56,9 @@ def expose(
     shots = Shots(shots)
     check_exposure(exposure, shots)
     check_settings(exposure, shots, laser_power_w, integration_s, noise)
-    electrons = collect(exposure, sensor, laser_power_w, integration_s)
+    per_light = sensitivity(sensor, laser_power_w, integration_s)
     samples = None if noise is None else noise.unbind(1)
-    return acquire(electrons, sensor, shots=shots, noise=samples, offsets=offsets)
-
-
-@dataclass(frozen=True)
-class Electrons:
-    """Noise-free charge of a batch of frames, at the laser power and integration time chosen.
-
-    Attributes
-    ----------
-    active_e, ambient_e : float32 [B, H, W]
-        Active S and ambient B, electrons over both taps in one sample.
-    mean_e : float32 [B, H, W]
-        Of a tap's packet, the variance of reading it included: (S + B) / 2 + sigma_r^2.
-    correlation : float32 [B, 8, H, W]
-        As in `Exposure`.
-    per_correlation_e : float32 [B, 1, 1]
-        Electrons of one sample per unit of `correlation`.
-    """
-
-    active_e: Tensor
-    ambient_e: Tensor
-    mean_e: Tensor
-    correlation: Tensor
-    per_correlation_e: Tensor
+    return acquire(exposure, per_light, sensor, shots=shots, noise=samples, offsets=offsets)
 
 
 @dataclass(frozen=True)
@@ -94,9 +67,9 @@ class Sensitivity:
 
     Attributes
     ----------
-    ambient_e : float32 [B, 1, 1]
+    ambient_e : float32 [B]
         Per W m-2 sr-1 of ambient radiance.
-    active_e : float32 [B, 1, 1]
+    active_e : float32 [B]
         Per W m-2 sr-1 and watt of active radiance and its correlation.
     """
 
@@ -107,98 +80,74 @@ class Sensitivity:
 def sensitivity(sensor: SensorConfig, laser_power_w: Tensor, integration_s: Tensor) -> Sensitivity:
     """Sensitivity at a laser power and an integration time, each [B]."""
     ambient_e = electrons_per_radiance_second(sensor) * integration_s
-    both = (ambient_e, ambient_e * laser_power_w)
-    return Sensitivity(*(value.to(torch.float32).view(-1, 1, 1) for value in both))
-
-
-def charge(exposure: Exposure, sensor: SensorConfig, per_light: Sensitivity) -> Electrons:
-    """Electrons that each pixel collects in one sample, with a sensitivity that is known."""
-    active_e = exposure.active * per_light.active_e
-    ambient_e = exposure.ambient * per_light.ambient_e
-    mean_e = torch.lerp(active_e, ambient_e, 0.5).add_(sensor.read_noise_e**2)
-    return Electrons(active_e, ambient_e, mean_e, exposure.correlation, per_light.active_e)
-
-
-def collect(
-    exposure: Exposure, sensor: SensorConfig, laser_power_w: Tensor, integration_s: Tensor
-) -> Electrons:
-    """Electrons that each pixel collects in one sample."""
-    return charge(exposure, sensor, sensitivity(sensor, laser_power_w, integration_s))
+    active_e = ambient_e * laser_power_w
+    return Sensitivity(ambient_e.to(torch.float32), active_e.to(torch.float32))
 
 
 def acquire(
-    electrons: Electrons,
+    exposure: Exposure,
+    per_light: Sensitivity,
     sensor: SensorConfig,
     *,
     shots: Shots,
     noise: Iterable[Tensor] | None,
     offsets: OffsetPattern | None,
 ) -> RawFrame:
-    """Noise, full well and converter for charge that is known to be sound; see `expose`.
+    """Noise, full well and converter for light that is known to be sound; see `expose`.
 
     Sample after sample, so that what one sample needs stays in the processor's cache; `noise`
     gives the normals [B, 2, H, W] of each.
     """
-    mean_e, per_correlation_e = electrons.mean_e, electrons.per_correlation_e
-    read_variance_e = sensor.read_noise_e**2
-    full_e = sensor.full_well_e + read_variance_e
-    pattern_lsb = fixed_pattern_lsb(electrons.ambient_e, sensor, offsets)
-    batch, height, width = mean_e.shape
-    dcs_lsb = mean_e.new_empty(batch, int(shots), height, width)
-    taps_e = mean_e.new_empty(batch, 2, height, width)
-    tap_a_e, tap_b_e = taps_e.unbind(1)
-    fullest_e = torch.zeros_like(taps_e)
-    samples = zip(
-        dcs_lsb.unbind(1),
-        electrons.correlation.unbind(1),
-        repeat(None) if noise is None else noise,
-        strict=False,
-    )
-    for sample_lsb, correlation, normals in samples:
-        tap_packets(mean_e, correlation, per_correlation_e, sensor.contrast, out=(tap_a_e, tap_b_e))
-        keep_positive(taps_e, read_variance_e)
-        if normals is not None:
-            add_noise(taps_e, normals)
-        clip_to_full_well(taps_e, full_e)
-        torch.maximum(taps_e, fullest_e, out=fullest_e)
-        read_out(tap_a_e, tap_b_e, pattern_lsb, sensor, out=sample_lsb)
-    digitise(dcs_lsb, *signed_limits_lsb(sensor.adc_bits))
-    return RawFrame(dcs_lsb, _saturated(fullest_e, full_e, dcs_lsb, sensor))
-
-
-def read_out(
-    tap_a_e: Tensor, tap_b_e: Tensor, pattern_lsb: Tensor, sensor: SensorConfig, *, out: Tensor
-) -> None:
-    """What the converter is given of a sample's taps [B, H, W], LSB [B, H, W].
-
-    The taps' difference, then gain and offset.
-    """
-    torch.sub(tap_a_e, tap_b_e, out=out)
-    torch.add(pattern_lsb, out, alpha=sensor.gain_lsb_per_e, out=out)
-
-
-def _saturated(fullest_e: Tensor, full_e: float, dcs_lsb: Tensor, sensor: SensorConfig) -> Tensor:
-    """Where the fuller tap of some sample was full, or its word is at a limit of the range."""
-    low, high = signed_limits_lsb(sensor.adc_bits)
-    # In place a comparison stays float32, which is vectorised; a bool result is not.
-    beyond = fullest_e.amax(dim=1).ge_(full_e)
-    beyond.add_(dcs_lsb.amax(dim=1).ge_(high))
-    return beyond.add_(dcs_lsb.amin(dim=1).le_(low)).bool()
-
-
-def fixed_pattern_lsb(
-    ambient_e: Tensor, sensor: SensorConfig, offsets: OffsetPattern | None
-) -> Tensor:
-    """Offset [B, H, W] of every sample: the taps' pattern and what ambient adds; or 0."""
+    shape = batch, height, width = exposure.active.shape
+    light, pixel = _light(exposure, per_light), pixel_of(sensor)
     if offsets is None:
-        return ambient_e.new_zeros(())
-    return add_ambient_offset(offsets.pattern_lsb, ambient_e, sensor)
+        offsets = OffsetPattern(torch.zeros(shape), torch.zeros(shape))
+        pixel = pixel._replace(ambient_lsb_per_e=np.float32(0))
+    if noise is None:
+        noise = repeat(torch.zeros(batch, 2, height, width))
+    dcs_lsb = torch.empty(batch, int(shots), height, width)
+    saturated = torch.zeros(shape, dtype=torch.bool)
+    made = array(offsets.pattern_lsb), pixel, dcs_lsb.numpy(), saturated.numpy()
+    for number, normals in zip(range(shots), noise, strict=False):
+        take_sample(number, light, array(normals), *made)
+    return RawFrame(dcs_lsb, saturated)
 
 
-def single_sample_snr(electrons: Electrons, sensor: SensorConfig) -> Tensor:
-    """Noise-free signal to noise of one sample [B, H, W]: `m S / sqrt(S + B + 2 sigma_r^2)`."""
-    signal_e = electrons.mean_e.rsqrt().mul_(electrons.active_e)
-    return signal_e.mul_(math.sqrt(0.5) * sensor.contrast)
+def scored_pixels(exposure: Exposure, per_light: Sensitivity, sensor: SensorConfig) -> Tensor:
+    """Pixels that count, bool [B, H, W], whatever is measured there.
+
+    Truth within `max_range_m`, noise-free signal to noise of one sample,
+    `m S / sqrt(S + B + 2 sigma_r^2)`, above `min_snr`.
+    """
+    scored = torch.empty(exposure.active.shape, dtype=torch.bool)
+    limits = np.float32(sensor.max_range_m), np.float32(sensor.min_snr)
+    light, truth_m = _light(exposure, per_light), array(exposure.distance_m)
+    strong_pixels(light, pixel_of(sensor), truth_m, *limits, scored.numpy())
+    return scored
+
+
+def _light(exposure: Exposure, per_light: Sensitivity) -> Light:
+    return Light(
+        correlation=array(exposure.correlation),
+        active=array(exposure.active),
+        ambient=array(exposure.ambient),
+        active_e=array(per_light.active_e),
+        ambient_e=array(per_light.ambient_e),
+    )
+
+
+def pixel_of(sensor: SensorConfig) -> Pixel:
+    """Constants that the loops over pixels need of a sensor."""
+    low_lsb, high_lsb = signed_limits_lsb(sensor.adc_bits)
+    return Pixel(
+        contrast=np.float32(sensor.contrast),
+        read_variance_e=np.float32(sensor.read_noise_e**2),
+        full_well_e=np.float32(sensor.full_well_e),
+        gain_lsb_per_e=np.float32(sensor.gain_lsb_per_e),
+        ambient_lsb_per_e=np.float32(sensor.offset_ambient_lsb / (2.0 * sensor.full_well_e)),
+        low_lsb=np.float32(low_lsb),
+        high_lsb=np.float32(high_lsb),
+    )
 
 
 def check_exposure(exposure: Exposure, shots: Shots) -> None:

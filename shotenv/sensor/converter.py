@@ -1,8 +1,6 @@
-"""The analogue-to-digital converter: gain, rounding, range."""
+"""The range of the analogue-to-digital converter."""
 
 from __future__ import annotations
-
-from torch import Tensor
 
 from unwrap.words import mid_scale
 
@@ -16,8 +14,3 @@ def signed_limits_lsb(bits: int) -> tuple[float, float]:
 def full_scale_lsb(bits: int) -> int:
     """Highest word of the converter, `2^bits - 1`."""
     return 2**bits - 1
-
-
-def digitise(analogue_lsb: Tensor, low_lsb: float, high_lsb: float) -> Tensor:
-    """Whole words in place: rounded half to even, clipped to the range; the dtype stays."""
-    return analogue_lsb.round_().clamp_(low_lsb, high_lsb)

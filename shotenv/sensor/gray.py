@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from shotenv.compiled import array
 from shotenv.config import SensorConfig
-from shotenv.sensor.converter import digitise, full_scale_lsb
-from shotenv.sensor.electrons import add_noise, clip_to_full_well, electrons_per_radiance_second
+from shotenv.sensor.converter import full_scale_lsb
+from shotenv.sensor.electrons import electrons_per_radiance_second
+from shotenv.sensor.pixels import noise_by_gray
 
 SHORTEST_EXPOSURE_S = 1e-5
 
@@ -37,11 +40,12 @@ def capture_gray(
     rate = electrons_per_radiance_second(sensor)
     charge_e = ambient * (rate * exposure_s)[:, None, None]
     if noise is not None:
-        read_variance_e = sensor.read_noise_e**2
-        add_noise(charge_e.add_(read_variance_e), noise).sub_(read_variance_e)
-    charge_e = clip_to_full_well(charge_e, sensor.full_well_e)
-    top = full_scale_lsb(sensor.adc_bits)
-    return digitise(charge_e * gray_gain_lsb_per_e(sensor), 0, top).to(torch.int32), exposure_s
+        # As for a tap: the packet is its own variance, see `shotenv.sensor.pixels`.
+        packet_e = charge_e + sensor.read_noise_e**2
+        charge_e = packet_e.addcdiv(noise, packet_e.rsqrt()).sub_(sensor.read_noise_e**2)
+    held_e = charge_e.clamp_(max=sensor.full_well_e)
+    words = (held_e * gray_gain_lsb_per_e(sensor)).round_()
+    return words.clamp_(0, full_scale_lsb(sensor.adc_bits)).to(torch.int32), exposure_s
 
 
 def gray_exposure_s(ambient: Tensor, sensor: SensorConfig) -> Tensor:
@@ -66,5 +70,7 @@ def sample_noise_lsb(
     """
     squared_gain = sensor.gain_lsb_per_e**2
     per_word = integration_s / exposure_s * (squared_gain / gray_gain_lsb_per_e(sensor))
-    variance = gray.to(torch.float32).mul_(per_word.to(torch.float32).view(-1, 1, 1))
-    return variance.add_(2.0 * squared_gain * sensor.read_noise_e**2).sqrt_()
+    dark = 2.0 * squared_gain * sensor.read_noise_e**2
+    noise_lsb = torch.empty(gray.shape)
+    noise_by_gray(array(gray, None), array(per_word), np.float32(dark), array(noise_lsb))
+    return noise_lsb

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 
 import torch
 from torch import Tensor
@@ -56,20 +55,3 @@ def draw_offsets(
     drift = torch.randn(height, width, generator=generator)
     drift.mul_(sensor.offset_drift_lsb_per_k * warmer_k)
     return OffsetPattern(pattern + drift, sensor.offset_calibrated_share * pattern)
-
-
-def add_ambient_offset(pattern_lsb: Tensor, ambient_e: Tensor, sensor: SensorConfig) -> Tensor:
-    """Pattern [B, H, W] plus what ambient light adds, of opposite sign in even and odd rows, LSB.
-
-    Linear in the ambient charge `ambient_e` [B, H, W] of both taps: `offset_ambient_lsb` where
-    ambient alone fills a tap, and no more.
-    """
-    filling_e = 2.0 * sensor.full_well_e
-    charge_e, rows = ambient_e.clamp(max=filling_e), row_parity(ambient_e.shape[-2])
-    return torch.addcmul(pattern_lsb, charge_e, rows, value=sensor.offset_ambient_lsb / filling_e)
-
-
-@lru_cache(maxsize=16)
-def row_parity(height: int) -> Tensor:
-    """1 in even and -1 in odd rows, float32 [height, 1]."""
-    return 1.0 - 2.0 * (torch.arange(height) % 2).to(torch.float32).unsqueeze(1)

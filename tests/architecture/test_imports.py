@@ -18,6 +18,7 @@ ONLY_IN = {
     "trimesh": ("shotenv/world/", "agents/"),
     "stable_baselines3": "agents/",
     "lightning": "unwrap/",
+    "numba": "shotenv/compiled.py",
     "plotly": "agents/",
     "PIL": ("shotenv/", "agents/"),
     "onnx": "agents/",
@@ -62,10 +63,13 @@ def test_world_knows_no_renderer_and_no_sensor():
 @pytest.mark.parametrize(
     ("package", "heavy"),
     [
-        ("shotenv", ("torch", "mitsuba", "drjit", "stable_baselines3")),
+        ("shotenv", ("torch", "numba", "mitsuba", "drjit", "stable_baselines3")),
         ("agents", ("torch", "mitsuba", "stable_baselines3", "plotly")),
-        ("agents.cli", ("torch", "mitsuba", "stable_baselines3", "plotly", "onnx", "trimesh")),
-        ("shotenv.config", ("torch", "mitsuba")),
+        (
+            "agents.cli",
+            ("torch", "numba", "mitsuba", "stable_baselines3", "plotly", "onnx", "trimesh"),
+        ),
+        ("shotenv.config", ("torch", "numba", "mitsuba")),
     ],
 )
 def test_import_is_light(package, heavy):

@@ -1,0 +1,203 @@
+"""What happens to light in a pixel, effect by effect, and the loops over pixels that compose them.
+
+Each effect is a function of numbers; a parameter at zero (or an infinite full well) switches it
+off. Electrons are counted over both taps unless a tap is named.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shotenv.compiled import inlined, loop
+
+Array = np.ndarray
+HALF, ZERO = np.float32(0.5), np.float32(0.0)
+
+
+class Light(NamedTuple):
+    """Noise-free light of B frames, and what it is worth in electrons of one sample, float32.
+
+    Attributes
+    ----------
+    correlation : [B, 8, H, W]
+    active, ambient : [B, H, W]
+        As in `Exposure`.
+    active_e, ambient_e : [B]
+        As in `Sensitivity`; `active_e` is that of the correlation, too.
+    """
+
+    correlation: Array
+    active: Array
+    ambient: Array
+    active_e: Array
+    ambient_e: Array
+
+
+class Pixel(NamedTuple):
+    """Constants of the pixels of a sensor, float32.
+
+    Attributes
+    ----------
+    contrast
+        Demodulation contrast m.
+    read_variance_e
+        Variance of reading one tap, electrons squared.
+    full_well_e
+        Most that a tap can hold.
+    gain_lsb_per_e
+        Converter gain.
+    ambient_lsb_per_e
+        Offset that ambient light adds, of opposite sign in even and odd rows.
+    low_lsb, high_lsb
+        Samples of the lowest and the highest word.
+    """
+
+    contrast: np.float32
+    read_variance_e: np.float32
+    full_well_e: np.float32
+    gain_lsb_per_e: np.float32
+    ambient_lsb_per_e: np.float32
+    low_lsb: np.float32
+    high_lsb: np.float32
+
+
+@inlined
+def packet_e(charge_e, read_variance_e):
+    """A tap's charge, not negative, plus the variance of reading it: the variance of both.
+
+    Poisson's variance equals its mean. The difference of two packets is that of their charges. A
+    charge may come out negative where a sample's light differs from the frame's mean.
+    """
+    return max(charge_e, ZERO) + read_variance_e
+
+
+@inlined
+def noisy_e(packet_e, normal):
+    """Shot and read noise added to a packet, which is its own variance, by one standard normal.
+
+    The normal distribution stands for Poisson's: one variate per packet keeps the noise stream
+    in step whatever the light is.
+    """
+    return packet_e + normal * np.sqrt(packet_e)
+
+
+@inlined
+def word_lsb(analogue_lsb, low_lsb, high_lsb):
+    """What the converter makes of its input: rounded half to even, clipped to its range."""
+    return min(max(np.rint(analogue_lsb), low_lsb), high_lsb)
+
+
+@inlined
+def ambient_offset_lsb(ambient_e, full_well_e, lsb_per_e):
+    """Offset that ambient light adds, linear until it alone fills both taps, and no more."""
+    return lsb_per_e * min(ambient_e, full_well_e + full_well_e)
+
+
+@loop
+def take_sample(
+    number: int,
+    light: Light,
+    normals: Array,
+    pattern_lsb: Array,
+    pixel: Pixel,
+    dcs_lsb: Array,
+    saturated: Array,
+) -> None:
+    """Sample `number` of B frames: taps, noise, full well, difference, converter.
+
+    The taps hold `(S + B +- m C) / 2`. Read noise may take a tap below zero.
+
+    Parameters
+    ----------
+    number : int
+        0..7.
+    normals : float32 [B, 2, H, W]
+        Standard normals of tap A and tap B.
+    pattern_lsb : float32 [B, H, W]
+        Fixed offset of each pixel.
+    dcs_lsb : float32 [B, n, H, W]
+        The sample is written into it.
+    saturated : bool [B, H, W]
+        Becomes true where a tap is full or the word at a limit of its range.
+    """
+    full_e = pixel.full_well_e + pixel.read_variance_e
+    frames, rows, columns = saturated.shape
+    for b in range(frames):
+        active_e, ambient_e = light.active_e[b], light.ambient_e[b]
+        swing_e = HALF * pixel.contrast * active_e
+        for i in range(rows):
+            parity = pixel.ambient_lsb_per_e if i % 2 == 0 else -pixel.ambient_lsb_per_e
+            active, ambient = light.active[b, i], light.ambient[b, i]
+            correlation, pattern = light.correlation[b, number, i], pattern_lsb[b, i]
+            normal_a, normal_b = normals[b, 0, i], normals[b, 1, i]
+            words, full = dcs_lsb[b, number, i], saturated[b, i]
+            for j in range(columns):
+                background_e = ambient[j] * ambient_e
+                mean_e = HALF * (active[j] * active_e + background_e)
+                half_e = correlation[j] * swing_e
+                a_e = noisy_e(packet_e(mean_e + half_e, pixel.read_variance_e), normal_a[j])
+                b_e = noisy_e(packet_e(mean_e - half_e, pixel.read_variance_e), normal_b[j])
+                held_e = min(a_e, full_e) - min(b_e, full_e)
+                offset_lsb = pattern[j] + ambient_offset_lsb(
+                    background_e, pixel.full_well_e, parity
+                )
+                word = word_lsb(
+                    offset_lsb + pixel.gain_lsb_per_e * held_e, pixel.low_lsb, pixel.high_lsb
+                )
+                words[j] = word
+                full[j] = full[j] | (
+                    (a_e >= full_e)
+                    | (b_e >= full_e)
+                    | (word <= pixel.low_lsb)
+                    | (word >= pixel.high_lsb)
+                )
+
+
+@loop
+def strong_pixels(
+    light: Light, pixel: Pixel, truth_m: Array, range_m: np.float32, snr: np.float32, strong: Array
+) -> None:
+    """Where truth lies within a range and one sample's noise-free signal to noise is above `snr`.
+
+    `m S / sqrt(S + B + 2 sigma_r^2)`.
+
+    Parameters
+    ----------
+    truth_m : float32 [B, H, W]
+    strong : bool [B, H, W]
+        Is written.
+    """
+    both_e = pixel.read_variance_e + pixel.read_variance_e
+    frames, rows, columns = strong.shape
+    for b in range(frames):
+        for i in range(rows):
+            for j in range(columns):
+                active_e = light.active[b, i, j] * light.active_e[b]
+                ambient_e = light.ambient[b, i, j] * light.ambient_e[b]
+                noise_e = np.sqrt(active_e + ambient_e + both_e)
+                above = pixel.contrast * active_e > snr * noise_e
+                strong[b, i, j] = above & (truth_m[b, i, j] <= range_m)
+
+
+@loop
+def noise_by_gray(gray: Array, variance_per_word: Array, dark: np.float32, noise: Array) -> None:
+    """Noise of a sample in the light that a gray image shows.
+
+    Parameters
+    ----------
+    gray : integer [B, H, W]
+    variance_per_word : float32 [B]
+        Of a sample, per word of the gray image.
+    dark : float32
+        Variance of a sample without light.
+    noise : float32 [B, H, W]
+        Standard deviation; is written.
+    """
+    frames, rows, columns = noise.shape
+    for b in range(frames):
+        for i in range(rows):
+            for j in range(columns):
+                variance = np.float32(gray[b, i, j]) * variance_per_word[b] + dark
+                noise[b, i, j] = np.sqrt(variance)
