@@ -84,7 +84,7 @@ def shifted(frame: PhaseFrame, shift_m: Tensor, frequency_hz: float) -> PhaseFra
 
     What a delay does to the samples of a sine, 4 pi f shift / c on the phase.
     """
-    turns = shift_turns(turns_of(frame.phase_rad), shift_m, frequency_hz)
+    turns = shift_turns(turns_of(frame.phase_rad.clone()), shift_m, frequency_hz)
     return replace(frame, phase_rad=phase_of_turns(turns))
 
 

@@ -59,12 +59,10 @@ def sound_samples(dcs: Tensor, offset_lsb: Tensor | None) -> Tensor:
 
 def quadratures_of(samples: Tensor) -> tuple[Tensor, Tensor]:
     """Cosine and sine [..., H, W]: D0 - D2 and D1 - D3 of four samples, D0 and D1 of two."""
-    if samples.shape[-3] == 2:
-        cosine, sine = samples.unbind(-3)
-    else:
-        first, opposite = samples.split(2, dim=-3)
-        cosine, sine = (first - opposite).unbind(-3)
-    return cosine, sine
+    maps = samples.unbind(-3)
+    if len(maps) == 2:
+        return maps[0], maps[1]
+    return maps[0] - maps[2], maps[1] - maps[3]
 
 
 def angle_of(cosine: Tensor, sine: Tensor) -> Tensor:
@@ -73,17 +71,22 @@ def angle_of(cosine: Tensor, sine: Tensor) -> Tensor:
 
 
 def strength_of(samples: Tensor, cosine: Tensor, sine: Tensor) -> tuple[Tensor, Tensor | None]:
-    """Amplitude and residual of samples and their quadratures, see `PhaseFrame`."""
-    length = (cosine * cosine).addcmul_(sine, sine).sqrt_()
+    """Amplitude and residual of samples, see `PhaseFrame`.
+
+    The quadratures of four samples, which are not needed any more, lend their memory: what is
+    in the processor's cache need not be fetched.
+    """
     if samples.shape[-3] == 2:
-        return length, None
-    first, opposite = samples.split(2, dim=-3)
-    return length.mul_(0.5), (first + opposite).abs_().amax(dim=-3)
+        return (cosine * cosine).addcmul_(sine, sine).sqrt_(), None
+    amplitude = cosine.mul_(cosine).addcmul_(sine, sine).sqrt_().mul_(0.5)
+    first, second, third, fourth = samples.unbind(-3)
+    residual = torch.add(first, third, out=sine).abs_()
+    return amplitude, torch.maximum(residual, (second + fourth).abs_(), out=residual)
 
 
 def turns_of(phase_rad: Tensor) -> Tensor:
-    """Phases in [-pi, 2 pi) as turns, one more, so none is negative."""
-    return torch.add(phase_rad.new_ones(()), phase_rad, alpha=1 / TWO_PI)
+    """Phases in [-pi, 2 pi), in place, as turns, one more, so none is negative."""
+    return phase_rad.mul_(1 / TWO_PI).add_(1)
 
 
 def phase_of_turns(turns: Tensor) -> Tensor:
