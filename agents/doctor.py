@@ -53,7 +53,7 @@ def _is_for_main_job(requirement: str) -> bool:
     return not any(f"extra == {quote}{e}{quote}" in requirement for quote in "'\"" for e in OTHERS)
 
 
-OTHERS = ("all", "dev", "docs", "export", "verify")
+OTHERS = ("all", "dev", "docs", "export", "fast", "verify")
 """Extras that the main job does without."""
 
 

@@ -54,7 +54,7 @@ class Exported(nn.Module):
         In float32 wherever it runs, so that a file does not depend on the machine that wrote it.
         """
         stride = self.stride(*sensed.gray.shape[-2:])
-        return predicted(self.network, sensed, self.sensor, stride, exact=True)
+        return predicted(self.network, sensed, self.sensor, stride)
 
     def merged(self, predicted_m: Tensor, wrapped_m: Tensor) -> Tensor:
         """Wrapped distance with the wraps that the prediction tells, all [1, H, W] in metres."""

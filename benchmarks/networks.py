@@ -18,8 +18,8 @@ from torch import Tensor
 from benchmarks.rows import row
 from benchmarks.turns import alternately
 from unwrap.correction import SensorDescription
-from unwrap.inference import prepared
-from unwrap.network import Settings, arithmetic, autocast
+from unwrap.inference import Prepared
+from unwrap.network import Settings, arithmetic
 from unwrap.sensed import Sensed, Truth
 from unwrap.train import TrainConfig, TrainingModule
 from unwrap.unwrapper import Unwrapper, load_unwrapper
@@ -100,13 +100,12 @@ def training(unwrapper: Unwrapper, device: torch.device, batch: int, rounds: int
 
 def outside(unwrapper: Unwrapper, device: torch.device, rounds: int) -> dict[str, Any]:
     """Share of the time of `Unwrapper.predict` that is not its network's."""
-    gray, network = images(1, device), prepared(unwrapper.network, device)
-    features = network.features(Sensed(gray), SensorDescription())
+    gray, network = images(1, device), Prepared(unwrapper.network, device)
+    features = unwrapper.network.features(Sensed(gray), SensorDescription())
 
     @torch.inference_mode()
     def bare() -> None:
-        with autocast(device):
-            network(features)
+        network(features)
 
     whole_s, bare_s = warm_and_timed(lambda: unwrapper.predict(gray), bare, device, rounds)
     note = f"{1e3 * whole_s:.2f} ms for a frame, of which the network {1e3 * bare_s:.2f} ms"

@@ -1,3 +1,5 @@
+import sys
+
 import pytest
 import torch
 from torch import nn
@@ -5,9 +7,10 @@ from unwrap_source import SENSOR, Walls
 
 from unwrap import inference
 from unwrap.acquisition import Shots
-from unwrap.inference import prepared
+from unwrap.inference import Prepared, folded
 from unwrap.nets import TofRegNet
 from unwrap.network import Settings, arithmetic, autocast
+from unwrap.program import Program
 from unwrap.unwrapper import load_unwrapper
 from unwrap.weights import save_weights
 from unwrap.zoo import NAMES, build
@@ -32,10 +35,10 @@ def trained(name):
 
 @pytest.mark.parametrize("name", NAMES)
 @torch.inference_mode()
-def test_a_prepared_network_computes_the_same(name, monkeypatch):
+def test_a_folded_network_computes_the_same(name, monkeypatch):
     monkeypatch.setattr(inference, "arithmetic", lambda device: torch.float32)
     network = trained(name)
-    ready = prepared(network, CPU)
+    ready = folded(network, CPU)
     sensed, _ = Walls(2).batch([0, 1], draw=0, shots=Shots.FOUR)
     features = network.features(sensed, SENSOR)
     before = features.clone()
@@ -46,14 +49,53 @@ def test_a_prepared_network_computes_the_same(name, monkeypatch):
     assert torch.equal(features, before)
 
 
-def test_a_prepared_network_normalises_nothing_and_leaves_the_network_alone():
+def test_a_folded_network_normalises_nothing_and_leaves_the_network_alone():
     network = trained("tofregnet")
     weights = {name: tensor.clone() for name, tensor in network.state_dict().items()}
-    ready = prepared(network, CPU)
+    ready = folded(network, CPU)
     assert not any(isinstance(layer, nn.BatchNorm2d) for layer in ready.modules())
     convolutions = [layer for layer in ready.modules() if isinstance(layer, nn.Conv2d)]
     assert {layer.weight.dtype for layer in convolutions} == {arithmetic(CPU)}
     assert all(torch.equal(weights[name], tensor) for name, tensor in network.state_dict().items())
+
+
+TRACED = [name for name in NAMES if build(name, Settings(width=4)).can_be_traced]
+
+
+@pytest.mark.parametrize("name", TRACED)
+@torch.inference_mode()
+def test_a_program_computes_the_same(name):
+    network = trained(name)
+    sensed, _ = Walls(2).batch([0, 1], draw=0, shots=Shots.FOUR)
+    features = network.features(sensed, SENSOR)
+    program = Program(network, features[:1], torch.float32)
+    before = features.clone()
+    for frame in (features[:1], features[1:]):
+        assert torch.allclose(program(frame), network(frame), atol=1e-3)
+    assert torch.equal(features, before)
+    assert sys.modules["openvino_telemetry"] is None  # Nothing is told to anybody.
+
+
+def test_all_but_phasenet_can_be_traced():
+    assert set(NAMES) - set(TRACED) == {"phasenet"}
+
+
+@pytest.mark.parametrize("installed", [True, False])
+@torch.inference_mode()
+def test_large_networks_become_programs_where_openvino_is_installed(installed, monkeypatch):
+    network, features = trained("tofregnet"), torch.rand(1, 1, 64, 96)
+    monkeypatch.setattr(inference, "can_compile", lambda: installed)
+    monkeypatch.setattr(inference, "arithmetic", lambda device: torch.float32)
+    made = []
+    monkeypatch.setattr(inference, "Program", lambda *a: made.append(a) or Program(*a))
+    assert torch.allclose(Prepared(network, CPU)(features), network(features), atol=0.5)
+    assert not made
+    monkeypatch.setattr(inference, "WORTH_COMPILING_MACS", 0)
+    ready = Prepared(network, CPU)
+    first = ready(features)
+    ready(features)
+    assert torch.equal(ready(features), first)
+    assert len(made) == installed
 
 
 def test_an_unwrapper_predicts_what_its_network_computes(tmp_path):

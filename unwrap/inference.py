@@ -2,19 +2,60 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import deepcopy
+from functools import cached_property
 from itertools import pairwise
 
 import torch
-from torch import nn
+from torch import Tensor, nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from unwrap.network import Network, arithmetic
+from unwrap.network import Network, arithmetic, autocast, multiply_accumulates
+from unwrap.program import Program, can_compile
 
 Convolution = nn.Conv2d | nn.ConvTranspose2d
+WORTH_COMPILING_MACS = 10**8
+"""Multiply-accumulates of a frame from which on a second of compiling pays."""
 
 
-def prepared(network: Network, device: torch.device) -> Network:
+class Prepared:
+    """A trained network made ready to predict on a device: `forward`, for predictions alone.
+
+    On a processor a program of OpenVINO for each size of frames, where that is installed, the
+    network can be compiled and is large enough; otherwise a `folded` copy. Which of them it is does
+    not depend on how many frames there are, so that a frame is always predicted alike.
+    """
+
+    def __init__(self, network: Network, device: torch.device):
+        self._network, self._device = network, device
+        self._forwards: dict[torch.Size, Callable[[Tensor], Tensor]] = {}
+
+    def __call__(self, features: Tensor) -> Tensor:
+        """What the network computes of `features` [B, C, H, W]; see `Network.features`."""
+        if features.shape not in self._forwards:
+            self._forwards[features.shape] = self._forward_of(features)
+        return self._forwards[features.shape](features)
+
+    def _forward_of(self, features: Tensor) -> Callable[[Tensor], Tensor]:
+        if not (self._device.type == "cpu" and can_compile() and self._network.can_be_traced):
+            return self._folded
+        if multiply_accumulates(self._network, features) < WORTH_COMPILING_MACS:
+            return self._folded
+        return Program(self._network, features, arithmetic(self._device))
+
+    @cached_property
+    def _folded(self) -> Callable[[Tensor], Tensor]:
+        network = folded(self._network, self._device)
+
+        def forward(features: Tensor) -> Tensor:
+            with autocast(self._device):
+                return network(features)
+
+        return forward
+
+
+def folded(network: Network, device: torch.device) -> Network:
     """A copy of `network` on `device` that predicts alike, but for rounding.
 
     Normalisations are folded into the convolutions before them (in evaluation mode they are

@@ -82,9 +82,14 @@ class Settings:
 
 
 class Network(nn.Module):
-    """Base of all networks; `needs` tells what of a frame they look at."""
+    """Base of all networks.
+
+    `needs` tells what of a frame they look at; `can_be_traced`, whether their forward pass of one
+    shape is a fixed chain of operations that torch can record.
+    """
 
     needs: ClassVar[Needs] = "gray"
+    can_be_traced: ClassVar[bool] = True
 
     def __init__(self, settings: Settings):
         super().__init__()

@@ -7,8 +7,7 @@ therefore thinned to them, and the prediction is brought back.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from contextlib import nullcontext
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from torch import Tensor
@@ -17,7 +16,7 @@ from torch.nn import functional
 from unwrap.correction import SensorDescription
 from unwrap.fusion import measured
 from unwrap.merge import nearest_wraps
-from unwrap.network import Needs, Network, Prediction, autocast
+from unwrap.network import Needs, Network, Prediction
 from unwrap.phase import unambiguous_range_m
 from unwrap.sensed import Sensed, mapped
 
@@ -99,14 +98,18 @@ def restored(
 
 
 def predicted(
-    network: Network, sensed: Sensed, sensor: SensorDescription, stride: int, *, exact: bool = False
+    network: Network,
+    sensed: Sensed,
+    sensor: SensorDescription,
+    stride: int,
+    *,
+    forward: Callable[[Tensor], Tensor] | None = None,
 ) -> Prediction:
     """What a network makes of frames that are thinned for it, at their own size.
 
-    `exact` computes in float32 wherever it runs, else in the type that is quickest there.
+    `forward` computes what the network's own does (None), but faster: `unwrap.inference.Prepared`.
     """
     shown = thinned(sensed, stride)
-    with nullcontext() if exact else autocast(sensed.gray.device):
-        output = network(network.features(shown, sensor))
+    output = (forward or network)(network.features(shown, sensor))
     prediction = network.predict(output, shown, sensor)
     return restored(prediction, sensed, sensor, stride, network.needs)

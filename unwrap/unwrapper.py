@@ -10,7 +10,7 @@ from torch import Tensor
 
 from unwrap.correction import Merge, SensorDescription, correct
 from unwrap.data import GRAY_FULL_SCALE
-from unwrap.inference import prepared
+from unwrap.inference import Prepared
 from unwrap.network import Network, Prediction, multiply_accumulates
 from unwrap.phase import unambiguous_range_m
 from unwrap.sensed import Sensed, mapped
@@ -45,7 +45,7 @@ class Unwrapper:
     network: Network = field(repr=False)
     metadata: dict = field(repr=False)
     fingerprint: str
-    _ready: dict[torch.device, Network] = field(default_factory=dict, repr=False, compare=False)
+    _ready: dict[torch.device, Prepared] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def unambiguous_m(self) -> float:
@@ -116,9 +116,9 @@ class Unwrapper:
     def _predicted(self, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         device = sensed.gray.device
         if device not in self._ready:
-            self._ready[device] = prepared(self.network, device)
+            self._ready[device] = Prepared(self.network, device)
         stride = self.stride(*sensed.gray.shape[-2:])
-        return predicted(self._ready[device], sensed, sensor, stride)
+        return predicted(self.network, sensed, sensor, stride, forward=self._ready[device])
 
     def macs(self, height: int, width: int) -> int:
         """Multiply-accumulate operations of one frame of `height` x `width` pixels.

@@ -22,6 +22,7 @@ ONLY_IN = {
     "plotly": "agents/",
     "PIL": ("shotenv/", "agents/"),
     "onnx": "agents/",
+    "openvino": "unwrap/program.py",
     "onnxruntime": "agents/",
 }
 

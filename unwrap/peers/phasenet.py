@@ -29,6 +29,7 @@ class PhaseNet(Network):
     """
 
     needs = "samples"
+    can_be_traced = False  # Where it unpools to depends on the image.
 
     def __init__(self, settings: Settings):
         super().__init__(settings)
