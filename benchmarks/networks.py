@@ -136,7 +136,7 @@ def share(
 def warm_and_timed(
     first: Callable[[], object], second: Callable[[], object], device: torch.device, rounds: int
 ) -> tuple[float, float]:
-    """Median seconds of both, by a clock that waits for the device, after a round not counted."""
+    """Seconds of both, by a clock that waits for the device, after a turn that is not counted."""
 
     def clock() -> float:
         if device.type == "cuda":
@@ -144,7 +144,7 @@ def warm_and_timed(
         return perf_counter()
 
     alternately(first, second, 1, clock)
-    return alternately(first, second, rounds, clock)
+    return alternately(first, second, rounds, clock, settled=True)
 
 
 def where(device: torch.device) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from statistics import median
 from time import thread_time
 
 
@@ -12,12 +11,24 @@ def alternately(
     second: Callable[[], object],
     repeats: int,
     clock: Callable[[], float] = thread_time,
+    *,
+    settled: bool = False,
 ) -> tuple[float, float]:
-    """Median seconds of both; by default those of the processor on this thread."""
-    times: tuple[list[float], list[float]] = ([], [])
-    for _ in range(repeats):
-        for function, taken in zip((first, second), times, strict=True):
-            start = clock()
-            function()
-            taken.append(clock() - start)
-    return median(times[0]), median(times[1])
+    """Seconds of both in the turn whose ratio is the median of all turns.
+
+    By default those of the processor on this thread. `settled` lets each run once more before it
+    is timed, so that it does not find the threads of the other still awake.
+    """
+    turns = [
+        (seconds(first, clock, settled), seconds(second, clock, settled)) for _ in range(repeats)
+    ]
+    return sorted(turns, key=lambda turn: turn[0] / turn[1])[repeats // 2]
+
+
+def seconds(function: Callable[[], object], clock: Callable[[], float], settled: bool) -> float:
+    """Time that `function` takes."""
+    if settled:
+        function()
+    start = clock()
+    function()
+    return clock() - start

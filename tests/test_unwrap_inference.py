@@ -68,7 +68,7 @@ def test_a_program_computes_the_same(name):
     network = trained(name)
     sensed, _ = Walls(2).batch([0, 1], draw=0, shots=Shots.FOUR)
     features = network.features(sensed, SENSOR)
-    program = Program(network, features[:1], torch.float32)
+    program = Program(network, features[:1], torch.float32, 1)
     before = features.clone()
     for frame in (features[:1], features[1:]):
         assert torch.allclose(program(frame), network(frame), atol=1e-3)

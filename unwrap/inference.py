@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from copy import deepcopy
 from functools import cached_property
 from itertools import pairwise
@@ -24,25 +25,28 @@ class Prepared:
 
     On a processor a program of OpenVINO for each size of frames, where that is installed, the
     network can be compiled and is large enough; otherwise a `folded` copy. Which of them it is does
-    not depend on how many frames there are, so that a frame is always predicted alike.
+    not depend on how many frames there are, so that a frame is always predicted alike. Either runs
+    on as many threads as torch had when this was made.
     """
 
     def __init__(self, network: Network, device: torch.device):
         self._network, self._device = network, device
+        self._threads = torch.get_num_threads()
         self._forwards: dict[torch.Size, Callable[[Tensor], Tensor]] = {}
 
     def __call__(self, features: Tensor) -> Tensor:
         """What the network computes of `features` [B, C, H, W]; see `Network.features`."""
         if features.shape not in self._forwards:
             self._forwards[features.shape] = self._forward_of(features)
-        return self._forwards[features.shape](features)
+        with torch_threads(self._threads):
+            return self._forwards[features.shape](features)
 
     def _forward_of(self, features: Tensor) -> Callable[[Tensor], Tensor]:
         if not (self._device.type == "cpu" and can_compile() and self._network.can_be_traced):
             return self._folded
         if multiply_accumulates(self._network, features) < WORTH_COMPILING_MACS:
             return self._folded
-        return Program(self._network, features, arithmetic(self._device))
+        return Program(self._network, features, arithmetic(self._device), self._threads)
 
     @cached_property
     def _folded(self) -> Callable[[Tensor], Tensor]:
@@ -53,6 +57,17 @@ class Prepared:
                 return network(features)
 
         return forward
+
+
+@contextmanager
+def torch_threads(count: int) -> Iterator[None]:
+    """Torch computes with `count` threads inside the context."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 def folded(network: Network, device: torch.device) -> Network:

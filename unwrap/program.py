@@ -44,9 +44,10 @@ class Program:
         An example; results depend on its shape alone.
     arithmetic : dtype
         float32 or bfloat16.
+    threads : int
     """
 
-    def __init__(self, network: nn.Module, features: Tensor, arithmetic: torch.dtype):
+    def __init__(self, network: nn.Module, features: Tensor, arithmetic: torch.dtype, threads: int):
         core = _core()
         import openvino
 
@@ -58,7 +59,7 @@ class Program:
         options = {
             "PERFORMANCE_HINT": "LATENCY",
             "INFERENCE_PRECISION_HINT": PRECISIONS[arithmetic],
-            "INFERENCE_NUM_THREADS": torch.get_num_threads(),
+            "INFERENCE_NUM_THREADS": threads,
             # Processes side by side would be held to the same cores.
             "ENABLE_CPU_PINNING": False,
         }

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from unwrap.correction import Merge, SensorDescription, correct
 from unwrap.data import GRAY_FULL_SCALE
-from unwrap.inference import Prepared
+from unwrap.inference import Prepared, torch_threads
 from unwrap.network import Network, Prediction, multiply_accumulates
 from unwrap.phase import unambiguous_range_m
 from unwrap.sensed import Sensed, mapped
@@ -74,7 +74,9 @@ class Unwrapper:
         """
         if self.network.needs != "gray":
             raise ValueError(f"{self.name} needs samples beside the gray image; use `look`")
-        return self.look(Sensed(as_float(gray)), SensorDescription(f1_hz=self.metadata["f1_hz"]))
+        with torch_threads(1):
+            sensed = Sensed(as_float(gray))
+        return self.look(sensed, SensorDescription(f1_hz=self.metadata["f1_hz"]))
 
     @torch.inference_mode()
     def look(self, sensed: Sensed, sensor: SensorDescription) -> Prediction:
@@ -95,7 +97,13 @@ class Unwrapper:
             raise ValueError(f"raw is None; {self.name} needs the samples of each frame")
         self.require_frequency(sensor)
         device = next(self.network.parameters()).device
+        if device not in self._ready:
+            self._ready[device] = Prepared(self.network, device)
+        # What is around the network is small; torch's threads, once awake, stay in its way.
+        with torch_threads(1):
+            return self._look(sensed, sensor, device)
 
+    def _look(self, sensed: Sensed, sensor: SensorDescription, device: torch.device) -> Prediction:
         count = FRAMES_AT_ONCE[device.type]
 
         def some(start: int) -> Sensed:
@@ -114,11 +122,8 @@ class Unwrapper:
             raise ValueError(f"f1_hz is {sensor.f1_hz:g}; {trained}")
 
     def _predicted(self, sensed: Sensed, sensor: SensorDescription) -> Prediction:
-        device = sensed.gray.device
-        if device not in self._ready:
-            self._ready[device] = Prepared(self.network, device)
-        stride = self.stride(*sensed.gray.shape[-2:])
-        return predicted(self.network, sensed, sensor, stride, forward=self._ready[device])
+        stride, ready = self.stride(*sensed.gray.shape[-2:]), self._ready[sensed.gray.device]
+        return predicted(self.network, sensed, sensor, stride, forward=ready)
 
     def macs(self, height: int, width: int) -> int:
         """Multiply-accumulate operations of one frame of `height` x `width` pixels.
