@@ -202,7 +202,7 @@ class TofRegNet(GrayNetwork):
         0 on a boundary, 1 halfway between two.
         """
         cycles = output / self.settings.unambiguous_m
-        return Prediction(output, 2 * (cycles - cycles.round()).abs())
+        return Prediction(output, cycles.sub_(cycles.round()).abs_().mul_(2))
 
 
 class TofSegNet(GrayNetwork):

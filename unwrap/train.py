@@ -119,7 +119,10 @@ class TrainingModule(lightning.LightningModule):
         """AdamW; the rate rises linearly over the warm-up, then falls linearly to the end."""
         config = self.config
         optimizer = torch.optim.AdamW(
-            self.network.parameters(), config.learning_rate, weight_decay=config.weight_decay
+            self.network.parameters(),
+            config.learning_rate,
+            weight_decay=config.weight_decay,
+            fused=True,  # A third of the time, which is a fifth of a step with few frames.
         )
         warmup = int(config.warmup_share * self.steps)
         final = config.final_learning_rate / config.learning_rate

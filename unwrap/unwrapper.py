@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -110,10 +111,7 @@ class Unwrapper:
             return mapped(lambda tensor: tensor[start : start + count].to(device), sensed)
 
         parts = [self._predicted(some(start), sensor) for start in range(0, len(sensed), count)]
-        return Prediction(
-            torch.cat([part.distance_m for part in parts]).to(sensed.gray.device),
-            torch.cat([part.confidence for part in parts]).to(sensed.gray.device),
-        )
+        return mapped(lambda tensor: tensor.to(sensed.gray.device), joined(parts))
 
     def require_frequency(self, sensor: SensorDescription) -> None:
         """Raise ValueError unless the network was trained for the sensor's first frequency."""
@@ -134,6 +132,16 @@ class Unwrapper:
         return multiply_accumulates(
             self.network, self.network.example(height // stride, width // stride)
         )
+
+
+def joined(parts: Sequence[Prediction]) -> Prediction:
+    """Predictions of one batch after the other."""
+    if len(parts) == 1:
+        return parts[0]
+    return Prediction(
+        torch.cat([part.distance_m for part in parts]),
+        torch.cat([part.confidence for part in parts]),
+    )
 
 
 def as_float(gray: Tensor) -> Tensor:
