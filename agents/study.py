@@ -41,7 +41,10 @@ from shotenv.progress import progress, say
 from unwrap.files import write_json
 
 if TYPE_CHECKING:
+    from stable_baselines3.common.policies import ActorCriticPolicy
+
     from agents.guard import ThermalGuard
+    from agents.warm_start import KnownFrames
     from shotenv.vector_env import ShotScheduleVectorEnv
 
 SCHEDULER: Final = "ppo"
@@ -77,6 +80,7 @@ def train_scheduler(config: DemoConfig, out: Path) -> PpoPolicy:
     """
     from agents.paired import PairedVecEnv
     from agents.training import Trainer
+    from agents.warm_start import warm_start
 
     envs = make_envs(config.env, "train", config.agent.num_envs, "SameStep")
     seeds = drive_seeds(config.study, min(VALIDATION_DRIVES, config.study.tuning_drives))
@@ -85,9 +89,25 @@ def train_scheduler(config: DemoConfig, out: Path) -> PpoPolicy:
     def validate(policy: PpoPolicy) -> float:
         return float(play_drives(policy, judges, seeds).reward.sum(axis=1).mean())
 
+    def warm(network: ActorCriticPolicy) -> None:
+        warm_start(network, _known_frames(config, guard), seed=config.agent.seed)
+
     guard = thermal_guard(config)
     paired, frames = PairedVecEnv(envs, guard), config.env.frames_per_drive
-    return Trainer(paired, guard, frames, config.agent, validate, out).run()
+    start = warm if config.agent.warm_start else None
+    return Trainer(paired, guard, frames, config.agent, validate, out, start).run()
+
+
+def _known_frames(config: DemoConfig, guard: ThermalGuard) -> KnownFrames:
+    """Every action in every frame of the training drives."""
+    from agents.training import training_drives
+    from agents.warm_start import known_frames
+
+    seeds = training_drives(config.agent).tolist()
+    envs = make_envs(config.env, "train", len(seeds), "Disabled")
+    frames = len(seeds) * config.env.frames_per_drive
+    with progress(frames, "every action of the training drives", "frame") as bar:
+        return known_frames(envs, seeds, guard, tick=bar.update)
 
 
 def thermal_guard(config: DemoConfig) -> ThermalGuard:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,6 +21,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.utils import set_random_seed
 from tqdm import tqdm
 
@@ -62,6 +63,8 @@ class Trainer:
         Mean return of a policy on validation drives; the best round's policy is kept.
     out : Path
         Gets the checkpoint, and the best policy as `policy.safetensors` and `agent.json`.
+    warm : callable, optional
+        Trains the actor before the first round, see `agents.warm_start`.
 
     Raises
     ------
@@ -77,11 +80,13 @@ class Trainer:
         config: AgentConfig,
         validate: Validate,
         out: Path,
+        warm: Callable[[ActorCriticPolicy], None] | None = None,
     ) -> None:
         self._envs, self._config, self._validate, self._out = envs, config, validate, out
+        self._warm = warm
         self._ppo = build_ppo(envs, config)
         self.policy = PpoPolicy(self._ppo.policy, config, guard)
-        self._drives = np.random.SeedSequence(config.seed).generate_state(config.drives)
+        self._drives = training_drives(config)
         self._few = config.drives < config.num_envs
         updates = math.ceil(frames_per_drive / config.rollout_steps)
         self._round_steps = updates * config.rollout_steps * config.num_envs
@@ -104,11 +109,15 @@ class Trainer:
         """
         self._out.mkdir(parents=True, exist_ok=True)
         state = self._load()
+        if state == Progress() and self._warm is not None:
+            self._warm(self._ppo.policy)
+            state = self._judged(state)
+            self._save(state)
         done = state.rounds * self._round_steps
         with progress(self._rounds * self._round_steps, "training", "step", done=done) as bar:
             while state.rounds < self._rounds:
                 self._train_round(state.rounds, bar)
-                state = self._validated(state)
+                state = replace(self._judged(state), rounds=state.rounds + 1)
                 bar.set_postfix_str(f"validation return {state.best_return:.1f}", refresh=False)
                 self._save(state)
         return PpoPolicy.load(self._out)
@@ -128,12 +137,13 @@ class Trainer:
         rate = self._config.learning_rate * (1.0 - 0.9 * number / self._rounds)
         self._ppo.lr_schedule = lambda _: rate
 
-    def _validated(self, state: Progress) -> Progress:
+    def _judged(self, state: Progress) -> Progress:
+        """`state` with the return of the policy as it is, which is kept where it is the best."""
         found = self._validate(self.policy)
         if found <= state.best_return:
-            return Progress(state.rounds + 1, state.best_return, state.best_round)
+            return state
         self.policy.save(self._out)
-        return Progress(state.rounds + 1, found, state.rounds)
+        return replace(state, best_return=found, best_round=state.rounds)
 
     def _save(self, state: Progress) -> None:
         words = {"schema": SCHEMA, "identity": self._identity, "progress": json.dumps(vars(state))}
@@ -160,6 +170,11 @@ class Trainer:
                 f"{path} belongs to another configuration; choose another folder or delete it"
             )
         return state
+
+
+def training_drives(config: AgentConfig) -> np.ndarray:
+    """Seeds of the drives that a scheduler is trained on."""
+    return np.random.SeedSequence(config.seed).generate_state(config.drives)
 
 
 def build_ppo(envs: Sb3VecEnv, config: AgentConfig) -> PPO:

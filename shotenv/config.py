@@ -256,6 +256,9 @@ class AgentConfig(Section):
         description="margin to the trip that shots need, in the most that they can warm the laser "
         "by in a frame; 0 = no guard",
     )
+    warm_start: bool = Field(
+        True, description="whether to start from the known costs of all actions in the drives"
+    )
     seed: int = Field(0, ge=0, description="seed of weights and drives")
 
 
