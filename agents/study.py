@@ -101,12 +101,12 @@ def train_scheduler(config: DemoConfig, out: Path) -> PpoPolicy:
 def _known_frames(config: DemoConfig, guard: ThermalGuard) -> KnownFrames:
     """Every action in every frame of the training drives."""
     from agents.training import training_drives
-    from agents.warm_start import known_frames
+    from agents.warm_start import ROLLOUTS, known_frames
 
     seeds = training_drives(config.agent).tolist()
     envs = make_envs(config.env, "train", len(seeds), "Disabled")
-    frames = len(seeds) * config.env.frames_per_drive
-    with progress(frames, "every action of the training drives", "frame") as bar:
+    frames = (1 + ROLLOUTS) * len(seeds) * config.env.frames_per_drive
+    with progress(frames, "every action in the training drives", "frame") as bar:
         return known_frames(envs, seeds, guard, tick=bar.update)
 
 

@@ -66,15 +66,15 @@ def known_frames(
 ) -> KnownFrames:
     """Frames of the drives `seeds`, as guarded random actions meet them.
 
-    `envs` has as many environments as there are seeds; `tick` is told the number of frames after
-    each drive.
+    `envs` has as many environments as there are seeds; `tick` is told the number of frames played,
+    1 + `ROLLOUTS` times those of the drives in all.
     """
     problem = envs.problem
     cost = tabulate(problem, seeds, tick=tick).table(problem.config.reward).cost
     seen = []
     for number in range(ROLLOUTS):
         recorded = _Recorded(GuardedPolicy(RandomPolicy(number), guard))
-        play_drives(recorded, envs, seeds)
+        play_drives(recorded, envs, seeds, tick=tick)
         seen.append(np.stack(recorded.observations, axis=1))
     observations = np.concatenate(seen)
     return KnownFrames(
