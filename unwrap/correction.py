@@ -108,28 +108,6 @@ def correct(
         Two or four samples without a prediction, an unknown merge, or samples that `decode`
         refuses.
     """
-    return correct_and_weigh(
-        raw,
-        predicted_m,
-        sensor,
-        merge=merge,
-        offset_lsb=offset_lsb,
-        noise_lsb=noise_lsb,
-        shift_m=shift_m,
-    )[0]
-
-
-def correct_and_weigh(
-    raw: RawFrame,
-    predicted_m: Tensor | None,
-    sensor: SensorDescription,
-    *,
-    merge: Merge,
-    offset_lsb: Tensor | None,
-    noise_lsb: Tensor | float | None,
-    shift_m: Tensor | None,
-) -> tuple[DepthFrame, Tensor]:
-    """What `correct` gives, and the weight of each pixel, float32 [B, H, W]: 1 valid, 0 not."""
     if merge not in MERGES:
         raise ValueError(f"merge is {merge!r}; expected one of {', '.join(MERGES)}")
     first = decode_at(0, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
@@ -156,7 +134,7 @@ def correct_and_weigh(
         raise ValueError(f"predicted_m is None; {int(raw.shots)} samples cannot be unwrapped alone")
     else:
         merged_m = _merged(first, predicted_m, sensor, merge)
-    return _frame(merged_m, valid, first, predicted_m, sensor), valid
+    return _frame(merged_m, valid, first, predicted_m, sensor)
 
 
 def decode_at(
