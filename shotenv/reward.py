@@ -60,7 +60,16 @@ def score_depth(
     unambiguous_m: float,
     range_m: float,
 ) -> DepthScore:
-    """Score depth float32 [B, H, W] against the truth over the pixels `scored`, bool [B, H, W]."""
+    """Score depth float32 [B, H, W] against the truth over the pixels `scored`, bool [B, H, W].
+
+    Raises
+    ------
+    ValueError
+        The maps have different shapes.
+    """
+    shapes = [tuple(maps.shape) for maps in (distance_m, valid, truth_m, scored)]
+    if len(set(shapes)) > 1:
+        raise ValueError(f"distance_m, valid, truth_m and scored are {shapes}; expected one shape")
     score = np.empty((5, len(distance_m)))
     _score(
         array(distance_m),

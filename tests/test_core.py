@@ -55,6 +55,11 @@ def test_score_by_hand():
     assert found.valid_share.item() == pytest.approx(2 / 4)
 
 
+def test_maps_of_different_shapes_are_not_scored():
+    with pytest.raises(ValueError, match="one shape"):
+        score([1.0, 2.0], [True], [9.0, 9.0], [True, True])
+
+
 def test_a_frame_without_scored_pixels_costs_nobody_anything():
     found = score([1.0, 2.0], [True, False], [9.0, 9.0], [False, False])
     assert found.error.item() == 0.0 and found.valid_share.item() == 1.0

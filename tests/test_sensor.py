@@ -90,6 +90,22 @@ def test_fewer_shots_are_a_prefix_with_and_without_noise(sensor):
             assert torch.equal(raw[shots].dcs_lsb, raw[Shots.EIGHT].dcs_lsb[:, :shots])
 
 
+def test_one_sensor_serves_a_batch_of_frames(sensor):
+    offsets = draw_offsets(sensor, 4, 5, generator=stream(Purpose.OFFSETS, 0))
+    one = wall(sensor, 4.0)
+    fields = (one.correlation, one.active, one.ambient, one.distance_m)
+    three = Exposure(*(torch.cat([value] * 3) for value in fields))
+    alone = noise_free(one, sensor, offsets=offsets).dcs_lsb
+    together = noise_free(three, sensor, offsets=offsets, batch=3).dcs_lsb
+    assert torch.equal(together, torch.cat([alone] * 3))
+    two = OffsetPattern(*(torch.cat([offsets.pattern_lsb] * 2) for _ in range(2)))
+    with pytest.raises(RuntimeError, match="expand"):
+        noise_free(three, sensor, offsets=two, batch=3)
+    gray, exposure_s = capture_gray(three.ambient, sensor, noise=None)
+    noise_lsb = sample_noise_lsb(gray, exposure_s[:1], torch.tensor([6e-4]), sensor)
+    assert torch.equal(noise_lsb, noise_lsb[:1].expand(3, -1, -1))
+
+
 def test_noise_of_fewer_shots_is_a_prefix_and_streams_differ():
     assert torch.equal(draw_noise(5, 6, 2, 3, 4), draw_noise(5, 6, 8, 3, 4)[:2])
     assert not torch.equal(draw_noise(5, 6, 2, 3, 4), draw_noise(5, 7, 2, 3, 4))

@@ -107,7 +107,8 @@ def acquire(
         noise = repeat(torch.zeros(batch, 2, height, width))
     dcs_lsb = torch.empty(batch, int(shots), height, width)
     saturated = torch.zeros(shape, dtype=torch.bool)
-    made = array(offsets.pattern_lsb), pixel, dcs_lsb.numpy(), saturated.numpy()
+    # A loop trusts shapes: one sensor serves all frames only where that is spelled out.
+    made = array(offsets.pattern_lsb.expand(shape)), pixel, dcs_lsb.numpy(), saturated.numpy()
     for number, normals in zip(range(shots), noise, strict=False):
         take_sample(number, light, array(normals), *made)
     return RawFrame(dcs_lsb, saturated)

@@ -72,5 +72,7 @@ def sample_noise_lsb(
     per_word = integration_s / exposure_s * (squared_gain / gray_gain_lsb_per_e(sensor))
     dark = 2.0 * squared_gain * sensor.read_noise_e**2
     noise_lsb = torch.empty(gray.shape)
-    noise_by_gray(array(gray, None), array(per_word), np.float32(dark), array(noise_lsb))
+    noise_by_gray(
+        array(gray, None), array(per_word.expand(len(gray))), np.float32(dark), array(noise_lsb)
+    )
     return noise_lsb
