@@ -8,12 +8,14 @@ order in which it is written: every processor gives the same numbers to the last
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numba
 import numpy as np
 from numba.extending import register_jitable
-from torch import Tensor
+
+if TYPE_CHECKING:  # Processes that render start without torch.
+    from torch import Tensor
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -18,7 +18,7 @@ import torch_jobs
 from render_worlds import DARK, SMALL, floor, mesh, square, wall, world
 
 from shotenv.render import RendererError, find_llvm, frame_instants, llvm, render_frame, workers
-from shotenv.render.geometry import REACH_M, geometry_at, tile_grid
+from shotenv.render.geometry import REACH_M, faces_of, posed, tile_grid
 from shotenv.render.texture import noise_texture
 from shotenv.render.workers import run_jobs
 from shotenv.world.model import Lamp, Light, Motion, MovingObject, Pose
@@ -113,9 +113,10 @@ def test_samples_are_taken_at_their_own_instants(sensor):
 def test_tiles_are_out_of_each_others_reach():
     things = (MovingObject(mesh(wall(0.0, 5.0)), Motion(Pose((30.0, 10.0, 0.0)), 5.0)),)
     times = tuple(np.linspace(0, 1, 12))
-    geometry = geometry_at(corner(moving=things), times, bounces=2)
-    copies = geometry.moving.reshape(len(times), -1, 3)
-    for index, tile in enumerate(geometry.tile_m):
+    scene = corner(moving=things)
+    moving = posed(scene, faces_of(scene), times, bounces=2)
+    copies = moving.corners.reshape(len(times), -1, 3)
+    for index, tile in enumerate(moving.tile_m):
         others = np.delete(copies, index, axis=0)[..., :2].reshape(-1, 2)
         assert np.linalg.norm(others - tile[:2], axis=1).min() >= 3 * REACH_M
 
@@ -299,7 +300,6 @@ def is_alive(pid: int) -> bool:
 
 
 def test_a_world_without_anything_that_moves_has_a_face_to_pad_with():
-    still = geometry_at(corner(), (0.0, 0.1), bounces=1)
-    assert len(still.moving) == 2
+    assert len(faces_of(corner()).thing) == 1
     moving = replace(corner(), moving=(MovingObject(mesh(wall(3.0)), Motion(Pose((0, 0, 0)))),))
-    assert len(geometry_at(moving, (0.0, 0.1), bounces=1).moving) == 4
+    assert len(faces_of(moving).thing) == 2

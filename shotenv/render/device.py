@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
@@ -16,3 +17,12 @@ def upload(values: np.ndarray) -> Any:
     gather instructions Dr.Jit emits: the kernel would be compiled anew for some worlds.
     """
     return dr.opaque(mi.Float(np.ascontiguousarray(values, dtype=np.float32).ravel()))
+
+
+def only_where(active: Any, compute: Callable[[], Any]) -> Any:
+    """`compute()`, a float, in lanes that are `active`, and 0 elsewhere.
+
+    Where no lane of those that a processor handles at once is active, it skips the work; lanes
+    that are merely masked cost it nearly as much as others.
+    """
+    return dr.if_stmt((), active, compute, lambda: mi.Float(0))

@@ -50,9 +50,9 @@ class FrameRenderer:
 
     def __init__(self, world: World, sensor: SensorConfig) -> None:
         start_mitsuba()
-        from shotenv.render.scene import StaticScene
+        from shotenv.render.scene import Surroundings
 
-        self._world, self._sensor, self._static = world, sensor, StaticScene(world)
+        self._world, self._sensor, self._surroundings = world, sensor, Surroundings(world)
         self._harmonics = harmonic_weights(sensor.harmonic_strength, sensor.highest_harmonic)
 
     def frame(
@@ -77,7 +77,7 @@ class FrameRenderer:
             camera,
             harmonics=self._harmonics,
             seed=seed,
-            static=self._static,
+            surroundings=self._surroundings,
         )
         laser, passive = np.array(instants.laser), np.array(instants.passive)
         return RenderedFrame(

@@ -13,28 +13,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shotenv.world.model import Mesh, Pose, World
+from shotenv.compiled import inlined, loop
+from shotenv.world.model import Mesh, Motion, Pose, World
+
+Array = np.ndarray
 
 REACH_M = 150.0
 """Length of the longest ray; what lies beyond counts as sky."""
 
 
 @dataclass(frozen=True)
-class Geometry:
-    """Triangles and what is known of each. S static faces, M moving faces, T instants.
+class Faces:
+    """What is known of the triangles of a world whatever the time. S static, then M moving ones.
 
     Attributes
     ----------
-    static_faces : int
-        S; what stands still is traced in world coordinates.
-    moving : float32 [T * M, 3, 3]
-        Corners of what moves at each instant, world coordinates plus `tile_m` of the instant.
-    panes : float32 [P, 3, 3]
-        Corners of all faces that light passes, still or moving, at each instant, like `moving`.
-    tile_m : float32 [T, 3]
-        Where on the grid the copy of each instant stands.
-    normals : float32 [S + T * M, 4]
-        Unit face normals and a zero.
+    still : int
+        S.
+    corners : float32 [S + M, 3, 3]
+        In the world; of what moves in the coordinates of its thing. M is at least one.
+    thing : int64 [M]
+        Which of the world's things a moving face belongs to.
+    normals : float32 [S, 4]
+        Unit normals of the static faces and a zero.
     surface : float32 [S + M, 4]
         Albedo where the noise texture is 0 and where it is 1, retro-reflection, emission.
     uv : float32 [S + M, 8]
@@ -42,13 +43,39 @@ class Geometry:
         mirrored and the clear share.
     """
 
-    static_faces: int
-    moving: np.ndarray
-    panes: np.ndarray
-    tile_m: np.ndarray
+    still: int
+    corners: np.ndarray
+    thing: np.ndarray
     normals: np.ndarray
     surface: np.ndarray
     uv: np.ndarray
+
+    @property
+    def is_pane(self) -> np.ndarray:
+        """Whether light passes a face, bool [S + M]."""
+        return self.uv[:, 7] > 0
+
+
+@dataclass(frozen=True)
+class Posed:
+    """Where the M moving faces of a world are at T instants.
+
+    Attributes
+    ----------
+    corners : float32 [T, M, 3, 3]
+        World coordinates plus `tile_m` of the instant.
+    normals : float32 [T, M, 4]
+        Unit normals and a zero.
+    panes : float32 [P, 3, 3]
+        Corners of all faces that light passes, still or moving, at each instant, like `corners`.
+    tile_m : float32 [T, 3]
+        Where on the grid the copy of each instant stands.
+    """
+
+    corners: np.ndarray
+    normals: np.ndarray
+    panes: np.ndarray
+    tile_m: np.ndarray
 
 
 def rotation(pose: Pose) -> np.ndarray:
@@ -61,35 +88,52 @@ def rotation(pose: Pose) -> np.ndarray:
     return np.array([[cy * cp, -sy, cy * sp], [sy * cp, cy, sy * sp], [-sp, 0.0, cp]])
 
 
-def geometry_at(world: World, times_s: Sequence[float], bounces: int) -> Geometry:
-    """Triangles of `world` at `times_s` for light paths of at most `bounces` surface hits."""
-    moving = _posed(world, times_s)
-    radius_m = _reach_from(world.ego.at(times_s[0]), moving)
-    tile = tile_grid(len(times_s), spacing_m=radius_m + (bounces + 1) * REACH_M)
-    meshes = [world.static, *(thing.mesh for thing in world.moving), *_padding(world)]
-    clear = np.concatenate([mesh.clear for mesh in meshes]) > 0
-    still, moves = np.split(clear, [len(world.static.corners)])
-    at_tile = tile[:, None, None, :]
-    panes = (world.static.corners[still] + at_tile, moving[:, moves] + at_tile)
-    return Geometry(
-        static_faces=len(world.static.corners),
-        moving=(moving + at_tile).reshape(-1, 3, 3).astype(np.float32),
-        panes=np.concatenate(panes, axis=1).reshape(-1, 3, 3).astype(np.float32),
-        tile_m=tile.astype(np.float32),
-        normals=_normals(np.concatenate([world.static.corners, moving.reshape(-1, 3, 3)])),
+def faces_of(world: World) -> Faces:
+    """The triangles of `world`."""
+    moving = [thing.mesh for thing in world.moving]
+    # A mesh cannot be empty.
+    moving = moving if any(len(mesh.corners) for mesh in moving) else [_nothing(world)]
+    meshes, still = [world.static, *moving], world.static.corners
+    normals = np.zeros((len(still), 4), np.float32)
+    _find_normals(still.astype(float), normals)
+    return Faces(
+        still=len(still),
+        corners=np.concatenate([mesh.corners for mesh in meshes]),
+        thing=np.repeat(np.arange(len(moving)), [len(mesh.corners) for mesh in moving]),
+        normals=normals,
         surface=np.concatenate([_surface(mesh) for mesh in meshes]),
         uv=np.concatenate([_edges_uv(mesh) for mesh in meshes]),
     )
 
 
-def _reach_from(eye: Pose, corners: np.ndarray) -> float:
-    """Largest distance along x or y from the eye to corners [..., 3], metres."""
-    # One column at a time: NumPy reduces short last axes slowly.
-    columns = (corners[..., axis] for axis in (0, 1))
-    ends = ((column.min(), column.max()) for column in columns)
-    return max(
-        max(high - at, at - low) for (low, high), at in zip(ends, eye.position_m, strict=False)
-    )
+def posed(world: World, faces: Faces, times_s: Sequence[float], bounces: int) -> Posed:
+    """The moving ones of `faces` at `times_s` for light paths of at most `bounces` surface hits."""
+    own, (turns, places) = faces.corners[faces.still :], _poses(world, times_s)
+    corners = np.empty((len(times_s), *own.shape), np.float32)
+    normals = np.zeros((*corners.shape[:2], 4), np.float32)
+    radius_m = _reach_from(world.ego.at(times_s[0]), own, faces.thing, turns, places)
+    tile_m = tile_grid(len(times_s), spacing_m=radius_m + (bounces + 1) * REACH_M)
+    _pose(own, faces.thing, turns, places, tile_m, corners, normals)
+    still, moves = np.split(faces.is_pane, [faces.still])
+    still_panes = faces.corners[: faces.still][still] + tile_m[:, None, None, :]
+    panes = np.concatenate([still_panes.astype(np.float32), corners[:, moves]], axis=1)
+    return Posed(corners, normals, panes.reshape(-1, 3, 3), tile_m.astype(np.float32))
+
+
+def _poses(world: World, times_s: Sequence[float]) -> tuple[Array, Array]:
+    """Rotations [T, K, 3, 3] and places [T, K, 3] of the things that move; K is at least one."""
+    motions = [thing.motion for thing in world.moving] or [Motion(Pose((0.0, 0.0, 0.0)))]
+    poses = [[motion.at(time_s) for motion in motions] for time_s in times_s]
+    turns = [[rotation(pose) for pose in row] for row in poses]
+    places = [[pose.position_m for pose in row] for row in poses]
+    return np.array(turns), np.array(places)
+
+
+def _reach_from(eye: Pose, own: Array, thing: Array, turns: Array, places: Array) -> float:
+    """Largest distance along x or y from the eye to what moves, at any instant, metres."""
+    bounds = np.array([[math.inf] * 3, [-math.inf] * 3])
+    _find_bounds(own, thing, turns, places, bounds)
+    return float(np.abs(bounds - eye.position_m)[:, :2].max())
 
 
 def tile_grid(count: int, spacing_m: float) -> np.ndarray:
@@ -100,43 +144,94 @@ def tile_grid(count: int, spacing_m: float) -> np.ndarray:
     return offsets * math.ceil(spacing_m)
 
 
-def _posed(world: World, times_s: Sequence[float]) -> np.ndarray:
-    """Corners [T, M, 3, 3] of everything that moves, float64, at `times_s`; M is at least one."""
-    parts = [
-        _placed(thing.mesh.corners, [thing.motion.at(t) for t in times_s]) for thing in world.moving
-    ]
-    still = Pose((0.0, 0.0, 0.0))
-    parts += [_placed(mesh.corners, [still] * len(times_s)) for mesh in _padding(world)]
-    return np.concatenate(parts, axis=1)
+@inlined
+def _in_world(turn, place, point):
+    """A point of a thing, in the thing's coordinates, to the world's."""
+    x, y, z = point[0], point[1], point[2]
+    return (
+        turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z + place[0],
+        turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z + place[1],
+        turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z + place[2],
+    )
 
 
-def _placed(corners: np.ndarray, poses: Sequence[Pose]) -> np.ndarray:
-    """Corners [M, 3, 3] in each of T poses, [T, M, 3, 3]."""
-    turns = np.stack([rotation(pose).T for pose in poses])
-    points = corners.reshape(-1, 3).astype(float) @ turns
-    points += np.array([pose.position_m for pose in poses])[:, None]
-    return points.reshape(len(poses), -1, 3, 3)
+@inlined
+def _normal(first, second, third):
+    """Unit normal of a triangle; zeros if it has no area."""
+    ax, ay, az = second[0] - first[0], second[1] - first[1], second[2] - first[2]
+    bx, by, bz = third[0] - first[0], third[1] - first[1], third[2] - first[2]
+    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    length = np.sqrt(x * x + y * y + z * z)
+    scale = length if length > 0.0 else 1.0
+    return x / scale, y / scale, z / scale
 
 
-def _padding(world: World) -> list[Mesh]:
-    """A triangle without area for worlds in which nothing moves: a mesh cannot be empty."""
-    if any(len(thing.mesh.corners) for thing in world.moving):
-        return []
+@loop
+def _find_bounds(own: Array, thing: Array, turns: Array, places: Array, bounds: Array) -> None:
+    """Widen bounds [2, 3] to hold the faces of things at all instants; see `_pose`."""
+    for t in range(len(turns)):
+        for face in range(len(own)):
+            for corner in range(3):
+                turn, place = turns[t, thing[face]], places[t, thing[face]]
+                point = _in_world(turn, place, own[face, corner])
+                for axis in range(3):
+                    bounds[0, axis] = min(bounds[0, axis], point[axis])
+                    bounds[1, axis] = max(bounds[1, axis], point[axis])
+
+
+@loop
+def _pose(
+    own: Array,
+    thing: Array,
+    turns: Array,
+    places: Array,
+    tile_m: Array,
+    corners: Array,
+    normals: Array,
+) -> None:
+    """Pose the faces [M, 3, 3] of things at T instants.
+
+    Parameters
+    ----------
+    thing : int64 [M]
+        Which thing a face belongs to.
+    turns, places : float64 [T, K, 3, 3] and [T, K, 3]
+        Rotations and places of the things.
+    tile_m : float64 [T, 3]
+        Is added to the corners.
+    corners, normals : float32 [T, M, 3, 3] and [T, M, 4]
+        Are written.
+    """
+    for t in range(len(turns)):
+        for face in range(len(own)):
+            turn, place = turns[t, thing[face]], places[t, thing[face]]
+            first = _in_world(turn, place, own[face, 0])
+            second = _in_world(turn, place, own[face, 1])
+            third = _in_world(turn, place, own[face, 2])
+            normal = _normal(first, second, third)
+            for axis in range(3):
+                corners[t, face, 0, axis] = first[axis] + tile_m[t, axis]
+                corners[t, face, 1, axis] = second[axis] + tile_m[t, axis]
+                corners[t, face, 2, axis] = third[axis] + tile_m[t, axis]
+                normals[t, face, axis] = normal[axis]
+
+
+@loop
+def _find_normals(corners: Array, normals: Array) -> None:
+    """Unit normals, into float32 [F, 4], of faces float64 [F, 3, 3]."""
+    for face in range(len(corners)):
+        normal = _normal(corners[face, 0], corners[face, 1], corners[face, 2])
+        for axis in range(3):
+            normals[face, axis] = normal[axis]
+
+
+def _nothing(world: World) -> Mesh:
+    """A triangle without area below the ego, for worlds in which nothing moves."""
     zero = np.zeros(1, np.float32)
     buried = np.asarray(world.ego.start.position_m) - (0.0, 0.0, 10.0)
     corners = np.broadcast_to(buried.astype(np.float32), (1, 3, 3))
     uv = np.zeros((1, 3, 2), np.float32)
-    return [Mesh(corners, uv, zero, zero, zero, zero, zero, zero)]
-
-
-def _normals(corners: np.ndarray) -> np.ndarray:
-    # np.cross and sums over a short last axis are several times slower on so many triangles.
-    (ax, ay, az), (bx, by, bz) = ((corners[:, i] - corners[:, 0]).T.copy() for i in (1, 2))
-    normal = np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
-    length = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
-    unit = np.zeros((len(corners), 4), np.float32)
-    unit[:, :3] = (normal / np.where(length > 0, length, 1.0)).T
-    return unit
+    return Mesh(corners, uv, zero, zero, zero, zero, zero, zero)
 
 
 def _surface(mesh: Mesh) -> np.ndarray:

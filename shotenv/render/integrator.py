@@ -16,13 +16,13 @@ import mitsuba as mi
 import numpy as np
 
 from shotenv.config import CameraConfig
-from shotenv.render.geometry import REACH_M, geometry_at
+from shotenv.render.geometry import REACH_M, posed
 from shotenv.render.instants import Instants
 from shotenv.render.light import PassiveLight
 from shotenv.render.modulation import FUNDAMENTAL, Harmonics, Modulation
 from shotenv.render.pinhole import Pinhole
 from shotenv.render.sampling import Lanes, Sampler
-from shotenv.render.scene import SURFACE_OFFSET_M, Hit, Scene, StaticScene
+from shotenv.render.scene import SURFACE_OFFSET_M, Hit, Scene, Surroundings
 from shotenv.world.model import World
 
 _RETRO_COS = 0.5
@@ -60,14 +60,14 @@ def trace(
     *,
     harmonics: Harmonics = FUNDAMENTAL,
     seed: int,
-    static: StaticScene | None = None,
+    surroundings: Surroundings | None = None,
 ) -> Traced:
     """Trace `camera.samples_per_pixel` paths per pixel and instant, in one kernel launch.
 
     The laser sits at the camera and shines evenly over the field of view. `harmonics` are those
-    of the correlation, see `unwrap.acquisition.harmonic_weights`; `static` is that of the same
-    world, where frames of it have been traced before. The result depends on the
-    arguments alone, bit for bit on one machine.
+    of the correlation, see `unwrap.acquisition.harmonic_weights`; `surroundings` are those of the
+    same world, where frames of it have been traced before. The result depends on the arguments
+    alone, bit for bit on one machine.
     """
     lanes = Lanes.of(len(instants), camera)
     eye = Pinhole(world.ego, instants, camera)
@@ -78,8 +78,8 @@ def trace(
         dr.gather(mi.Bool, mi.Bool(list(instants.laser)), lanes.instant),
         dr.gather(mi.Bool, mi.Bool(list(instants.passive)), lanes.instant),
     )
-    geometry = geometry_at(world, instants.times_s, camera.bounces)
-    scene = Scene(geometry, StaticScene(world) if static is None else static)
+    surroundings = Surroundings(world) if surroundings is None else surroundings
+    scene = Scene(surroundings, posed(world, surroundings.faces, instants.times_s, camera.bounces))
     sampler = Sampler(lanes, instants, camera, seed=seed)
     light = _follow(scene, lights, lanes, camera.bounces, sampler)
     return _collect(light, lanes, len(instants), camera)
@@ -170,10 +170,11 @@ def _follow(scene: Scene, lights: _Lights, lanes: Lanes, bounces: int, sampler: 
         glow = dr.select(passive_on & (way_back > 0), hit.emission, 0)
         light.ambient += throughput * glow
 
-        irradiance = passive.daylight(scene, hit, instant, sampler, passive_on)
+        aim, which = sampler.next_2d(), sampler.next_1d()
         number, sample = sampler.next_1d(), sampler.next_2d()
         onward = _Onward.drawn(hit, direction, number, sample)
-        irradiance += passive.lamps(scene, hit, instant, onward.number, passive_on)
+        numbers = aim, which, onward.number
+        irradiance = passive.irradiance(scene, hit, instant, numbers, passive_on)
         # Per what is kept: the surface reflects to the camera whatever way the path goes on.
         irradiance *= hit.diffuse * dr.select(onward.scatters, 1, hit.albedo)
         throughput *= onward.kept

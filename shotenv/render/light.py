@@ -14,7 +14,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from shotenv.render.device import upload
+from shotenv.render.device import only_where, upload
 from shotenv.render.geometry import REACH_M, rotation
 from shotenv.render.instants import Instants
 from shotenv.render.scene import Hit, Scene
@@ -68,13 +68,28 @@ class PassiveLight:
         """Radiance of the sky, W m-2 sr-1: linear in the sine of elevation, the horizon's below."""
         return dr.fma(self._zenith - self._horizon, dr.maximum(direction.z, 0), self._horizon)
 
-    def daylight(self, scene: Scene, hit: Hit, instant, sampler, active):
+    def irradiance(self, scene: Scene, hit: Hit, instant, numbers, active):
+        """Estimate of the irradiance of all passive light on a surface, W m-2.
+
+        `numbers` are random: a point of the unit square and a number for `daylight`, a number for
+        `lamps`.
+        """
+        aim, which, lamp = numbers
+        return only_where(
+            active,
+            lambda: (
+                self.daylight(scene, hit, instant, aim, which, active)
+                + self.lamps(scene, hit, instant, lamp, active)
+            ),
+        )
+
+    def daylight(self, scene: Scene, hit: Hit, instant, aim, number, active):
         """Irradiance of the sun on a surface, with its shadow, W m-2; deep indoors also the sky's.
 
         Indoors, daylight comes through the opening: the sky is sampled there, and one of sun and
         sky is drawn in proportion to their unshadowed irradiance.
         """
-        choice = self._sky_through_opening(hit, sampler.next_2d(), sampler.next_1d())
+        choice = self._sky_through_opening(hit, aim, number)
         sun = self._sun_irradiance * dr.maximum(dr.dot(hit.normal, self._sun_direction), 0)
         sun = dr.select(self._opening.lets_in(hit.point, self._sun_direction), sun, 0)
         choice = choice.offer(sun, self._sun_direction, mi.Float(REACH_M))

@@ -9,8 +9,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from shotenv.render.device import upload
-from shotenv.render.geometry import REACH_M, Geometry
+from shotenv.render.device import only_where, upload
+from shotenv.render.geometry import REACH_M, Posed, faces_of
 from shotenv.render.texture import noise_texture
 from shotenv.world.model import World
 
@@ -50,36 +50,38 @@ class _Near:
     corner_weight: Any
 
 
-class StaticScene:
-    """What stands still in a world, on the device: good for every frame of it."""
+class Surroundings:
+    """What no time changes in a world, on the device: good for every frame of it."""
 
     def __init__(self, world: World):
-        self.scene = _mitsuba_scene(world.static.corners)
+        self.faces = faces = faces_of(world)
+        self.scene = _mitsuba_scene(faces.corners[: faces.still])
+        self.count = dr.opaque(mi.UInt32, faces.still)
+        self.surface = upload(faces.surface)
+        self.uv = upload(faces.uv)
+        self.noise = mi.Texture2f(
+            mi.TensorXf(noise_texture()[..., None]), wrap_mode=dr.WrapMode.Repeat
+        )
 
 
 class Scene:
-    """A `Geometry` on the device, ready for rays.
+    """A world at each of its instants, on the device, ready for rays.
 
     What stands still is traced in world coordinates, what moves in those of its instant's tile;
     the nearer of the two hits counts.
     """
 
-    def __init__(self, geometry: Geometry, static: StaticScene):
-        self._static = static.scene
-        self._moving = _mitsuba_scene(geometry.moving, beside=static.scene)
-        self._tile = upload(geometry.tile_m)
-        self._normals = upload(geometry.normals)
-        self._surface = upload(geometry.surface)
-        self._uv = upload(geometry.uv)
-        self._noise = mi.Texture2f(
-            mi.TensorXf(noise_texture()[..., None]), wrap_mode=dr.WrapMode.Repeat
-        )
-        self._has_panes = dr.opaque(mi.Bool, len(geometry.panes) > 0)
+    def __init__(self, surroundings: Surroundings, posed: Posed):
+        self._still, beside = surroundings, surroundings.scene
+        self._moving = _mitsuba_scene(posed.corners.reshape(-1, 3, 3), beside=beside)
+        self._tile = upload(posed.tile_m)
+        normals = np.concatenate([surroundings.faces.normals, posed.normals.reshape(-1, 4)])
+        self._normals = upload(normals)
+        self._has_panes = dr.opaque(mi.Bool, len(posed.panes) > 0)
         # A mesh cannot be empty.
-        panes = geometry.panes if len(geometry.panes) else geometry.moving[:1]
-        self._panes = _mitsuba_scene(panes, beside=static.scene)
-        self._static_faces = dr.opaque(mi.UInt32, geometry.static_faces)
-        self._moving_faces = dr.opaque(mi.UInt32, len(geometry.moving) // len(geometry.tile_m))
+        panes = posed.panes if len(posed.panes) else posed.corners[0, :1]
+        self._panes = _mitsuba_scene(panes, beside=beside)
+        self._moving_faces = dr.opaque(mi.UInt32, posed.corners.shape[1])
 
     def hit(self, origin, direction, instant, active, coherent: bool = False) -> Hit:
         """Nearest surface along each ray, within `REACH_M`; neighbouring rays may be alike."""
@@ -88,12 +90,14 @@ class Scene:
         distance = dr.select(valid, near.distance_m, 0)
         normal = dr.gather(mi.Vector4f, self._normals, near.posed_face, valid).xyz
         normal = dr.select(dr.dot(normal, direction) > 0, -normal, normal)
-        low, high, retro, emission = dr.gather(mi.Vector4f, self._surface, face, valid)
-        first, rest = (dr.gather(mi.Vector4f, self._uv, 2 * face + i, valid) for i in range(2))
+        low, high, retro, emission = dr.gather(mi.Vector4f, self._still.surface, face, valid)
+        first, rest = (
+            dr.gather(mi.Vector4f, self._still.uv, 2 * face + i, valid) for i in range(2)
+        )
         along, across = near.corner_weight
         u = first[0] + along * first[2] + across * rest[0]
         v = first[1] + along * first[3] + across * rest[1]
-        noise = self._noise.eval(mi.Point2f(u, v), valid)[0]
+        noise = self._still.noise.eval(mi.Point2f(u, v), valid)[0]
         point = dr.fma(direction, distance, origin)
         return Hit(
             valid=valid,
@@ -117,20 +121,24 @@ class Scene:
         """
         tile = dr.gather(mi.Vector3f, self._tile, instant, active)
         length = dr.minimum(length, REACH_M)
-        blocked = self._static.ray_test(_ray(origin, direction, length), False, active)
+        blocked = self._still.scene.ray_test(_ray(origin, direction, length), False, active)
         free = active & ~blocked
         free &= ~self._moving.ray_test(_ray(origin + tile, direction, length), False, free)
         behind = active & ~free & self._has_panes
-        behind = self._panes.ray_test(_ray(origin + tile, direction, length), False, behind)
-        through = self._through_panes(origin, direction, length, instant, behind)
-        return dr.select(free, 1, dr.select(behind, through, 0))
+
+        def through():
+            meets = self._panes.ray_test(_ray(origin + tile, direction, length), False, behind)
+            share = self._through_panes(origin, direction, length, instant, meets)
+            return dr.select(meets, share, 0)
+
+        return dr.select(free, 1, only_where(behind, through))
 
     def _through_panes(self, origin, direction, length, instant, active):
         """Product of the clear shares of all surfaces on each ray, walked one by one."""
 
         def onward(share, start, left_m, walking):
             near = self._nearest(start, direction, left_m, instant, walking)
-            clear = dr.gather(mi.Float, self._uv, 8 * near.face + 7, near.valid)
+            clear = dr.gather(mi.Float, self._still.uv, 8 * near.face + 7, near.valid)
             step_m = near.distance_m + SURFACE_OFFSET_M
             share = dr.select(near.valid, share * clear, share)
             walking &= near.valid & (share > 0) & (step_m < left_m)
@@ -142,12 +150,12 @@ class Scene:
     def _nearest(self, origin, direction, length, instant, active, coherent=False) -> _Near:
         tile = dr.gather(mi.Vector3f, self._tile, instant, active)
         ray = _ray(origin, direction, length)
-        still = self._static.ray_intersect_preliminary(ray, coherent, active)
+        still = self._still.scene.ray_intersect_preliminary(ray, coherent, active)
         ray = _ray(origin + tile, direction, dr.minimum(still.t, length))
         moved = self._moving.ray_intersect_preliminary(ray, coherent, active)
         moves = moved.t < still.t
         distance = dr.minimum(still.t, moved.t)
-        first = dr.select(moves, self._static_faces, 0)
+        first = dr.select(moves, self._still.count, 0)
         posed_face = dr.select(moves, moved.prim_index, still.prim_index) + first
         return _Near(
             valid=active & (distance < length),
@@ -166,9 +174,12 @@ def _ray(origin, direction, length):
 
 def _mitsuba_scene(corners: np.ndarray, beside: Any = None):
     """Triangles [F, 3, 3], ready for rays; in one kernel with `beside`, another such scene."""
-    parts = {"type": "scene", "mesh": triangle_mesh(corners)}
-    # OptiX traces rays of several scenes in one kernel only where they share a binding table.
-    return mi.load_dict(parts if beside is None else parts | {"parent_scene": beside})
+    parts: dict[str, Any] = {"type": "scene", "mesh": triangle_mesh(corners)}
+    # OptiX traces rays of several scenes in one kernel only where they share a binding table; for
+    # a processor that would be time lost.
+    if beside is not None and mi.variant().startswith("cuda"):
+        parts["parent_scene"] = beside
+    return mi.load_dict(parts)
 
 
 def triangle_mesh(corners: np.ndarray, bsdf: Any = None, **attributes: np.ndarray) -> Any:

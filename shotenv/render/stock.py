@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from shotenv.config import CameraConfig
-from shotenv.render.geometry import geometry_at, rotation
+from shotenv.render.geometry import faces_of, posed, rotation
 from shotenv.render.scene import triangle_mesh
 from shotenv.render.texture import noise_texture
 from shotenv.world.model import Light, Pose, World
@@ -49,10 +49,11 @@ def stock_path(camera: CameraConfig) -> Any:
 
 
 def _triangles(world: World, time_s: float) -> Any:
-    geometry = geometry_at(world, (time_s,), bounces=1)
-    corners = np.concatenate([world.static.corners, geometry.moving - geometry.tile_m[0]])
-    first, along, across = np.split(geometry.uv[:, :6], 3, axis=1)
-    low, high, *_ = geometry.surface.T
+    faces = faces_of(world)
+    moving = posed(world, faces, (time_s,), bounces=1)
+    corners = np.concatenate([world.static.corners, moving.corners[0] - moving.tile_m[0]])
+    first, along, across = np.split(faces.uv[:, :6], 3, axis=1)
+    low, high, *_ = faces.surface.T
     return triangle_mesh(
         corners,
         mi.load_dict(_textured()),
