@@ -9,6 +9,8 @@ What a mirror throws on a surface that is seen directly (a caustic) is left out.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 from typing import Any
 
 import drjit as dr
@@ -227,16 +229,27 @@ def _reflected(hit: Hit, intensity, cosine, distance_m):
 def _collect(light: _Light, lanes: Lanes, instants: int, camera: CameraConfig) -> Traced:
     """Mean over the samples of each pixel; distances are those of sample 0."""
     samples = camera.samples_per_pixel
+    first = dr.arange(mi.UInt32, instants * camera.width * camera.height) * samples
     dr.eval(light.distance_m, light.ambient, light.active, light.correlation)
-    centre = dr.arange(mi.UInt32, instants * camera.width * camera.height) * samples
+    images = [
+        dr.gather(mi.Float, light.distance_m, first),
+        *(
+            _sum(values, first, samples) / samples
+            for values in (light.ambient, light.active, light.correlation)
+        ),
+    ]
+    dr.eval(images)
     shape = (instants, camera.height, camera.width)
+    return Traced(*(image.numpy().reshape(shape) for image in images))
 
-    def mean(values) -> np.ndarray:
-        return (dr.block_sum(values, samples) / samples).numpy().reshape(shape)
 
-    return Traced(
-        distance_m=dr.gather(mi.Float, light.distance_m, centre).numpy().reshape(shape),
-        ambient=mean(light.ambient),
-        active=mean(light.active),
-        correlation=mean(light.correlation),
-    )
+def _sum(values, first, count: int):
+    """Sums of `count` neighbours, halves on halves; several times as fast as `dr.block_sum`.
+
+    To the last bit what that gives of 4, down to the sign of zero.
+    """
+    parts = [dr.gather(mi.Float, values, first + i) for i in range(count)]
+    while len(parts) > 1:
+        half = (len(parts) + 1) // 2
+        parts = [reduce(add, parts[i::half]) for i in range(half)]
+    return dr.select(parts[0] == 0, 0, parts[0])
