@@ -9,7 +9,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from shotenv.compiled import array, loop
 from shotenv.drive import Drive
 from shotenv.observe import SEEN_FEATURES
 from shotenv.problem import Problem
@@ -22,6 +21,7 @@ from shotenv.sensor import (
     sensitivity,
 )
 from unwrap.acquisition import Shots
+from unwrap.compiled import array, loop
 from unwrap.correction import correct
 from unwrap.data import GRAY_FULL_SCALE
 from unwrap.frames import DepthFrame, RawFrame

@@ -8,9 +8,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from shotenv.compiled import array, loop
 from shotenv.config import RewardConfig
 from shotenv.frames import ShotCost
+from unwrap.compiled import array, loop
 
 Array = np.ndarray
 

@@ -8,8 +8,8 @@ import pytest
 import torch
 
 from shotenv import measure, reward
-from shotenv.compiled import array, loop
 from shotenv.sensor import pixels
+from unwrap.compiled import array, loop
 
 ROWS, COLUMNS = 5, 19
 

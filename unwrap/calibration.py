@@ -14,12 +14,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from unwrap.files import write_json
 from unwrap.frames import PhaseFrame
 from unwrap.phase import BELOW_TWO_PI, TWO_PI, decode, phase_of_turns, turns_of, unambiguous_range_m
+from unwrap.pixels import Straight
 
 BINS = 256
 LARGEST_FILE_BYTES = 2**20
@@ -67,6 +69,13 @@ class WiggleTable:
         slopes = turns.diff()
         return torch.stack((turns[:-1] - slopes * place[:-1], slopes))
 
+    @cached_property
+    def straight(self) -> Straight:
+        """The same lines for the compiled loops."""
+        constant, slope = self._lines.to(torch.float32).numpy()
+        bins_per_rad = np.float32(len(self.error_rad) / TWO_PI)
+        return Straight(constant, slope, np.float32(int(self._first)), bins_per_rad)
+
     def turns_of(self, phase_rad: Tensor) -> Tensor:
         """Phases in [-pi, 2 pi) as turns without their error, one more, so none is negative."""
         first, lines = self._first.to(phase_rad), self._lines.to(phase_rad)
@@ -77,6 +86,10 @@ class WiggleTable:
     def corrected(self, frame: PhaseFrame) -> PhaseFrame:
         """`frame` with the phase error removed."""
         return replace(frame, phase_rad=phase_of_turns(self.turns_of(frame.phase_rad)))
+
+
+FLAT = WiggleTable((0.0,) * 4)
+"""No phase error."""
 
 
 def shifted(frame: PhaseFrame, shift_m: Tensor, frequency_hz: float) -> PhaseFrame:

@@ -6,15 +6,17 @@ frequencies, and need the prediction only where these disagree.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from unwrap.acquisition import SAMPLES_PER_FREQUENCY, Shots
-from unwrap.calibration import WiggleTable, shift_turns
+from unwrap.calibration import FLAT, WiggleTable, shift_turns
+from unwrap.compiled import array
 from unwrap.dual import unwrap_dual
 from unwrap.frames import DepthFrame, PhaseFrame, RawFrame
 from unwrap.merge import merge_nearest, merge_none, merge_regression
@@ -28,6 +30,7 @@ from unwrap.phase import (
     turns_of,
     unambiguous_range_m,
 )
+from unwrap.pixels import RULES, Limits, decode_pixels, merge_pixels
 
 Merge = Literal["nearest", "floor", "none"]
 MERGES: dict[Merge, Callable[[Tensor, Tensor, float, float], Tensor]] = {
@@ -110,8 +113,10 @@ def correct(
     """
     if merge not in MERGES:
         raise ValueError(f"merge is {merge!r}; expected one of {', '.join(MERGES)}")
-    first = decode_at(0, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
     noise = sensor.noise_lsb if noise_lsb is None else noise_lsb
+    if predicted_m is not None and _can_walk(raw, predicted_m):
+        return _walked(raw, predicted_m, sensor, merge, offset_lsb, noise, shift_m)
+    first = decode_at(0, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
     # Weights 0 and 1 in floats: comparing into a bool and converting it is several times slower.
     valid = torch.sub(first.amplitude, noise, alpha=sensor.min_snr).ge_(0)
     valid.gt_(raw.saturation)
@@ -135,6 +140,65 @@ def correct(
     else:
         merged_m = _merged(first, predicted_m, sensor, merge)
     return _frame(merged_m, valid, first, predicted_m, sensor)
+
+
+def _can_walk(raw: RawFrame, predicted_m: Tensor) -> bool:
+    """Whether `unwrap.pixels` may do the work: plain values in memory, of two or four samples."""
+    if raw.shots == Shots.EIGHT or torch.compiler.is_compiling() or torch.jit.is_tracing():
+        return False
+    maps = (raw.dcs_lsb, predicted_m)
+    plain = all(values.is_cpu and values.dtype == torch.float32 for values in maps)
+    fits = raw.dcs_lsb.ndim == 4 and predicted_m.shape == raw.saturated.shape
+    return plain and fits and not predicted_m.requires_grad
+
+
+def _walked(
+    raw: RawFrame,
+    predicted_m: Tensor,
+    sensor: SensorDescription,
+    merge: Merge,
+    offset_lsb: Tensor | None,
+    noise_lsb: Tensor | float,
+    shift_m: Tensor | None,
+) -> DepthFrame:
+    """`correct` by the compiled loops of `unwrap.pixels`."""
+    shape = raw.saturated.shape
+    cosine, sine = np.empty((2, *shape), np.float32)
+    amplitude, residual = np.empty((2, *shape), np.float32)
+    offset = _map_of(0.0 if offset_lsb is None else offset_lsb, shape)
+    if not decode_pixels(array(raw.dcs_lsb), offset, cosine, sine, amplitude, residual):
+        sound_samples(raw.dcs_lsb, None)  # Says where they are not.
+    valid, distance_m = np.empty(shape, np.bool_), np.empty(shape, np.float32)
+    unambiguous_m = unambiguous_range_m(sensor.f1_hz)
+    merge_pixels(
+        array(angle_of(*map(torch.from_numpy, (cosine, sine)))),
+        (FLAT if sensor.wiggle is None else sensor.wiggle[0]).straight,
+        _shift_turns(shift_m, unambiguous_m, len(valid)),
+        amplitude,
+        _map_of(noise_lsb, shape),
+        array(raw.saturated, np.bool_),
+        array(predicted_m),
+        Limits(*map(np.float32, (unambiguous_m, sensor.saturation_range_m, sensor.min_snr))),
+        RULES.index(merge),
+        distance_m,
+        valid,
+    )
+    depth_m, sound, strength = map(torch.from_numpy, (distance_m, valid, amplitude))
+    opposed = torch.from_numpy(residual) if raw.shots == Shots.FOUR else None
+    return DepthFrame(depth_m, sound, strength, opposed, unambiguous_m)
+
+
+def _map_of(value: Tensor | float, shape: Sequence[int]) -> np.ndarray:
+    """A number, or a map that is common to a batch, for every pixel of it."""
+    maps = value if isinstance(value, Tensor) else torch.tensor(value)
+    return array(maps.expand(shape))
+
+
+def _shift_turns(shift_m: Tensor | None, unambiguous_m: float, batch: int) -> np.ndarray:
+    if shift_m is None:
+        return np.zeros(batch, np.float32)
+    turns = shift_m.remainder(unambiguous_m) / unambiguous_m
+    return array(turns.expand(batch))
 
 
 def decode_at(

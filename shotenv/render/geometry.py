@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shotenv.compiled import inlined, loop
 from shotenv.world.model import Mesh, Motion, Pose, World
+from unwrap.compiled import inlined, loop
 
 Array = np.ndarray
 

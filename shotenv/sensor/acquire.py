@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import repeat
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from shotenv.compiled import array
 from shotenv.config import SensorConfig
 from shotenv.frames import Exposure
 from shotenv.sensor.converter import signed_limits_lsb
@@ -18,6 +18,7 @@ from shotenv.sensor.electrons import electrons_per_radiance_second
 from shotenv.sensor.offsets import OffsetPattern
 from shotenv.sensor.pixels import Light, Pixel, strong_pixels, take_sample
 from unwrap.acquisition import Shots
+from unwrap.compiled import array
 from unwrap.frames import RawFrame
 
 
@@ -105,13 +106,13 @@ def acquire(
         pixel = pixel._replace(ambient_lsb_per_e=np.float32(0))
     if noise is None:
         noise = repeat(torch.zeros(batch, 2, height, width))
-    dcs_lsb = torch.empty(batch, int(shots), height, width)
-    saturated = torch.zeros(shape, dtype=torch.bool)
+    dcs_lsb = np.empty((batch, int(shots), height, width), np.float32)
+    saturated = np.zeros(shape, np.bool_)
     # A loop trusts shapes: one sensor serves all frames only where that is spelled out.
-    made = array(offsets.pattern_lsb.expand(shape)), pixel, dcs_lsb.numpy(), saturated.numpy()
+    made = array(offsets.pattern_lsb.expand(shape)), pixel, dcs_lsb, saturated
     for number, normals in zip(range(shots), noise, strict=False):
         take_sample(number, light, array(normals), *made)
-    return RawFrame(dcs_lsb, saturated)
+    return RawFrame(torch.from_numpy(dcs_lsb), torch.from_numpy(saturated))
 
 
 def scored_pixels(exposure: Exposure, per_light: Sensitivity, sensor: SensorConfig) -> Tensor:
@@ -120,11 +121,11 @@ def scored_pixels(exposure: Exposure, per_light: Sensitivity, sensor: SensorConf
     Truth within `max_range_m`, noise-free signal to noise of one sample,
     `m S / sqrt(S + B + 2 sigma_r^2)`, above `min_snr`.
     """
-    scored = torch.empty(exposure.active.shape, dtype=torch.bool)
+    scored = np.empty(exposure.active.shape, np.bool_)
     limits = np.float32(sensor.max_range_m), np.float32(sensor.min_snr)
     light, truth_m = _light(exposure, per_light), array(exposure.distance_m)
-    strong_pixels(light, pixel_of(sensor), truth_m, *limits, scored.numpy())
-    return scored
+    strong_pixels(light, pixel_of(sensor), truth_m, *limits, scored)
+    return torch.from_numpy(scored)
 
 
 def _light(exposure: Exposure, per_light: Sensitivity) -> Light:
@@ -137,6 +138,7 @@ def _light(exposure: Exposure, per_light: Sensitivity) -> Light:
     )
 
 
+@lru_cache(maxsize=64)
 def pixel_of(sensor: SensorConfig) -> Pixel:
     """Constants that the loops over pixels need of a sensor."""
     low_lsb, high_lsb = signed_limits_lsb(sensor.adc_bits)

@@ -6,11 +6,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from shotenv.compiled import array
 from shotenv.config import SensorConfig
 from shotenv.sensor.converter import full_scale_lsb
 from shotenv.sensor.electrons import electrons_per_radiance_second
 from shotenv.sensor.pixels import noise_by_gray
+from unwrap.compiled import array
 
 SHORTEST_EXPOSURE_S = 1e-5
 
@@ -71,8 +71,6 @@ def sample_noise_lsb(
     squared_gain = sensor.gain_lsb_per_e**2
     per_word = integration_s / exposure_s * (squared_gain / gray_gain_lsb_per_e(sensor))
     dark = 2.0 * squared_gain * sensor.read_noise_e**2
-    noise_lsb = torch.empty(gray.shape)
-    noise_by_gray(
-        array(gray, None), array(per_word.expand(len(gray))), np.float32(dark), array(noise_lsb)
-    )
-    return noise_lsb
+    noise_lsb = np.empty(gray.shape, np.float32)
+    noise_by_gray(array(gray, None), array(per_word.expand(len(gray))), np.float32(dark), noise_lsb)
+    return torch.from_numpy(noise_lsb)

@@ -18,7 +18,7 @@ ONLY_IN = {
     "trimesh": ("shotenv/world/", "agents/"),
     "stable_baselines3": "agents/",
     "lightning": "unwrap/",
-    "numba": "shotenv/compiled.py",
+    "numba": "unwrap/compiled.py",
     "plotly": "agents/",
     "PIL": ("shotenv/", "agents/"),
     "onnx": "agents/",
