@@ -11,7 +11,7 @@ from benchmarks.rows import row
 from benchmarks.turns import alternately
 from shotenv.config import SensorConfig, find_config, read_config
 from shotenv.frames import Exposure
-from shotenv.sensor import acquire, draw_offsets, noise_samples, sensitivity, stream
+from shotenv.sensor import acquire, draw_offsets, light_of, noise_samples, sensitivity, stream
 from shotenv.sensor.noise import Purpose
 from unwrap.acquisition import SAMPLES_PER_FREQUENCY, Shots, demodulation_phase_rad, frequency_index
 from unwrap.phase import decode, unambiguous_range_m
@@ -33,13 +33,14 @@ def run() -> list[dict]:
 def measured(threads: int) -> dict:
     torch.set_num_threads(threads)
     sensor = read_config(SensorConfig, find_config("sensor", "epc660"))
-    light = made_up_light(sensor)
+    exposure = made_up_exposure(sensor)
     per_light = sensitivity(sensor, torch.tensor([7.0]), torch.tensor([6.5e-4]))
     offsets = draw_offsets(sensor, HEIGHT, WIDTH, generator=stream(Purpose.OFFSETS, 0))
 
     def sense() -> None:
         noise = noise_samples([0], [0], HEIGHT, WIDTH)
-        raw = acquire(light, per_light, sensor, shots=Shots.EIGHT, noise=noise, offsets=offsets)
+        light = light_of(exposure, per_light)
+        raw = acquire(light, sensor, shots=Shots.EIGHT, noise=noise, offsets=offsets)
         for first in (0, SAMPLES_PER_FREQUENCY):
             decode(raw.dcs_lsb[:, first : first + SAMPLES_PER_FREQUENCY])
 
@@ -56,7 +57,7 @@ def measured(threads: int) -> dict:
     return row(name, sense_s / draw_s, "<=", GOAL, note)
 
 
-def made_up_light(sensor: SensorConfig) -> Exposure:
+def made_up_exposure(sensor: SensorConfig) -> Exposure:
     """Random distances and daylight: the time depends on neither."""
     random = torch.Generator().manual_seed(0)
     distance_m = 2.0 + 18.0 * torch.rand(1, HEIGHT, WIDTH, generator=random)

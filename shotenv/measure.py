@@ -15,6 +15,7 @@ from shotenv.problem import Problem
 from shotenv.reward import DepthScore, score_depth
 from shotenv.sensor import (
     acquire,
+    light_of,
     noise_samples,
     sample_noise_lsb,
     scored_pixels,
@@ -28,7 +29,7 @@ from unwrap.frames import DepthFrame, RawFrame
 from unwrap.sensed import Sensed
 
 Array = np.ndarray
-FOUR, ONE_M = np.float32(4.0), np.float32(1.0)
+ZERO, ONE_M, FOUR = np.float32(0.0), np.float32(1.0), np.float32(4.0)
 
 
 @dataclass(frozen=True)
@@ -96,10 +97,11 @@ def acquire_depth(
     if noise is None:
         noise = noise_of(drive, step, bank.height, bank.width)
     exposure = bank.exposure(frames)
-    per_light = drive.sensitivity
+    full = light = light_of(exposure, drive.sensitivity)
     if power_w is not None:
-        per_light = sensitivity(sensor, power_w, drive.integration_s)
-    raw = acquire(exposure, per_light, sensor, shots=shots, noise=noise, offsets=drive.offsets)
+        light = light_of(exposure, sensitivity(sensor, power_w, drive.integration_s))
+    raw = acquire(light, sensor, shots=shots, noise=noise, offsets=drive.offsets)
+    scored = scored_pixels(full, exposure.distance_m, sensor)
     noise_lsb = sample_noise_lsb(
         bank.gray(frames), problem.gray_exposure_s.take(frames), drive.integration_s, sensor
     )
@@ -114,7 +116,6 @@ def acquire_depth(
         noise_lsb=noise_lsb,
         shift_m=drive.drift_m,
     )
-    scored = scored_pixels(exposure, drive.sensitivity, sensor)
     return Acquisition(raw, depth, predicted_m, noise_lsb, exposure.distance_m, scored)
 
 
@@ -192,20 +193,22 @@ def _see(
     """`SEEN_FEATURES`, float32 [B, 6], of maps [B, H, W]; summed by columns, as scores are."""
     frames, rows, columns = valid.shape
     for b in range(frames):
-        sums = np.zeros((6, columns))
+        sums, counts = np.zeros((4, columns)), np.zeros((2, columns), np.int32)
         for i in range(rows):
             for j in range(columns):
                 four_sigma_lsb = FOUR * noise_lsb[b, i, j]
                 amplitude, residual = amplitude_lsb[b, i, j], residual_lsb[b, i, j]
                 apart_m = abs(distance_m[b, i, j] - predicted_m[b, i, j])
-                good = np.float32(valid[b, i, j])
                 sums[0, j] += amplitude
                 sums[1, j] += amplitude / (amplitude + four_sigma_lsb)
-                sums[2, j] += good
-                sums[3, j] += np.float32(saturated[b, i, j])
-                sums[4, j] += residual / (residual + four_sigma_lsb)
-                sums[5, j] += good * apart_m / (apart_m + ONE_M)
-        for k in range(1, 5):
-            seen[b, k] = sums[k].sum() / (rows * columns)
-        seen[b, 0] = np.log1p(sums[0].sum() / (rows * columns)) / 6.9
-        seen[b, 5] = sums[5].sum() / max(sums[2].sum(), 1.0)
+                sums[2, j] += residual / (residual + four_sigma_lsb)
+                sums[3, j] += apart_m / (apart_m + ONE_M) if valid[b, i, j] else ZERO
+                counts[0, j] += valid[b, i, j]
+                counts[1, j] += saturated[b, i, j]
+        pixels, all_valid = rows * columns, counts[0].sum()
+        seen[b, 0] = np.log1p(sums[0].sum() / pixels) / 6.9
+        seen[b, 1] = sums[1].sum() / pixels
+        seen[b, 2] = all_valid / pixels
+        seen[b, 3] = counts[1].sum() / pixels
+        seen[b, 4] = sums[2].sum() / pixels
+        seen[b, 5] = sums[3].sum() / max(all_valid, 1)

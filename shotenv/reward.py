@@ -46,7 +46,7 @@ class DepthScore:
     valid_share: Tensor
 
 
-FARTHEST_ERROR_M = np.float32(1e9)
+FARTHEST_ERROR_M, ZERO = np.float32(1e9), np.float32(0.0)
 """Stands for the error where there is no distance: its term is 1 within the rounding of a float."""
 
 
@@ -102,25 +102,25 @@ def _score(
     """
     frames, rows, columns = distance_m.shape
     for b in range(frames):
-        sums = np.zeros((6, columns))
+        sums, counts = np.zeros((3, columns)), np.zeros((3, columns), np.int32)
         for i in range(rows):
             for j in range(columns):
                 error_m = abs(distance_m[b, i, j] - truth_m[b, i, j])
                 if not error_m < FARTHEST_ERROR_M:
                     error_m = FARTHEST_ERROR_M
-                counts = np.float32(scored[b, i, j])
-                good = counts * np.float32(valid[b, i, j])
-                sums[0, j] += counts * error_m / (error_m + scale_m)
-                sums[1, j] += good * error_m
-                sums[2, j] += good * error_m * error_m
-                sums[3, j] += good * np.float32(error_m < near_m)
-                sums[4, j] += good
-                sums[5, j] += counts
-        all_valid, all_scored = sums[4].sum(), sums[5].sum()
+                counted = scored[b, i, j]
+                good = counted & valid[b, i, j]
+                sums[0, j] += error_m / (error_m + scale_m) if counted else ZERO
+                sums[1, j] += error_m if good else ZERO
+                sums[2, j] += error_m * error_m if good else ZERO
+                counts[0, j] += counted
+                counts[1, j] += good
+                counts[2, j] += good & (error_m < near_m)
+        all_scored, all_valid, all_near = counts[0].sum(), counts[1].sum(), counts[2].sum()
         score[0, b] = sums[0].sum() / all_scored if all_scored else 0.0
         score[1, b] = sums[1].sum() / all_valid if all_valid else range_m
         score[2, b] = np.sqrt(sums[2].sum() / all_valid) if all_valid else range_m
-        score[3, b] = sums[3].sum() / all_scored if all_scored else 1.0
+        score[3, b] = all_near / all_scored if all_scored else 1.0
         score[4, b] = all_valid / all_scored if all_scored else 1.0
 
 

@@ -19,6 +19,7 @@ from shotenv.problem import check_fits, describe
 from shotenv.sensor import (
     Purpose,
     acquire,
+    light_of,
     noise_samples,
     sample_noise_lsb,
     scored_pixels,
@@ -102,7 +103,9 @@ class SensedFrames:
         """Pixels that count, bool [B, H, W]: truth within the range, signal to noise enough."""
         frames = self.frames[list(numbers)]
         drive = self._drives(frames, draw)
-        return scored_pixels(self._exposure(frames), drive.sensitivity, self._config.sensor)
+        exposure = self._exposure(frames)
+        light = light_of(exposure, drive.sensitivity)
+        return scored_pixels(light, exposure.distance_m, self._config.sensor)
 
     def follows(self, number: int) -> bool:
         """Whether the frame at `number` comes right after the one at `number - 1`, in a clip."""
@@ -157,8 +160,7 @@ class SensedFrames:
         return Sensed(
             gray=gray,
             raw=acquire(
-                exposure,
-                drive.sensitivity,
+                light_of(exposure, drive.sensitivity),
                 sensor,
                 shots=shots,
                 noise=noise,

@@ -18,7 +18,7 @@ import torch_jobs
 from render_worlds import DARK, SMALL, floor, mesh, square, wall, world
 
 from shotenv.render import RendererError, find_llvm, frame_instants, llvm, render_frame, workers
-from shotenv.render.geometry import REACH_M, faces_of, posed, tile_grid
+from shotenv.render.geometry import REACH_M, faces_of, posed, rotation, tile_grid
 from shotenv.render.texture import noise_texture
 from shotenv.render.workers import run_jobs
 from shotenv.world.model import Lamp, Light, Motion, MovingObject, Pose
@@ -119,6 +119,32 @@ def test_tiles_are_out_of_each_others_reach():
     for index, tile in enumerate(moving.tile_m):
         others = np.delete(copies, index, axis=0)[..., :2].reshape(-1, 2)
         assert np.linalg.norm(others - tile[:2], axis=1).min() >= 3 * REACH_M
+
+
+def test_things_stand_where_their_motion_brings_them():
+    motion = Motion(Pose((3.0, -1.0, 0.2), 0.4, 0.1), speed_m_s=8.0, yaw_rate_rad_s=0.7)
+    thing = MovingObject(mesh(square((0.3, 0.1, 1), (0.2, 0.3, 0), (0, 0.1, 0.5))), motion)
+    scene, times = (
+        corner(moving=(MovingObject(mesh(wall(1.0)), Motion(Pose((0, 0, 0)))), thing)),
+        (0.0, 0.3),
+    )
+    found = posed(scene, faces_of(scene), times, bounces=2)
+    for t, pose in enumerate(map(motion.at, times)):
+        expected = thing.mesh.corners.astype(float) @ rotation(pose).T + pose.position_m
+        on_tile = found.corners[t, 2:] - found.tile_m[t]
+        np.testing.assert_allclose(on_tile, expected, atol=1e-4)
+        across = np.cross(expected[:, 1] - expected[:, 0], expected[:, 2] - expected[:, 0])
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+        np.testing.assert_allclose(found.normals[t, 2:, :3], across, atol=1e-6)
+
+
+def test_panes_stand_with_the_things_that_they_are_part_of():
+    pane = MovingObject(mesh(wall(2.0, 1.0), clear=0.5), Motion(Pose((0, 0, 0)), 5.0))
+    scene = replace(corner(moving=(pane,)), static=mesh(wall(7.0), clear=0.3))
+    found = posed(scene, faces_of(scene), (0.0, 0.2), bounces=1)
+    ahead = (found.panes.reshape(2, 4, 3, 3) - found.tile_m[:, None, None])[..., 0]
+    np.testing.assert_allclose(ahead[:, :2], 7.0, atol=1e-4)
+    np.testing.assert_allclose(ahead[:, 2:, 0], [[2.0, 2.0], [3.0, 3.0]], atol=1e-4)
 
 
 def test_tiles_stand_about_the_origin():

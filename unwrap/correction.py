@@ -168,10 +168,11 @@ def _walked(
     offset = _map_of(0.0 if offset_lsb is None else offset_lsb, shape)
     if not decode_pixels(array(raw.dcs_lsb), offset, cosine, sine, amplitude, residual):
         sound_samples(raw.dcs_lsb, None)  # Says where they are not.
-    valid, distance_m = np.empty(shape, np.bool_), np.empty(shape, np.float32)
-    unambiguous_m = unambiguous_range_m(sensor.f1_hz)
+    angle_rad, valid = _angle_into(cosine, sine), np.empty(shape, np.bool_)
+    # What is in the processor's cache need not be fetched.
+    distance_m, unambiguous_m = sine, unambiguous_range_m(sensor.f1_hz)
     merge_pixels(
-        array(angle_of(*map(torch.from_numpy, (cosine, sine)))),
+        angle_rad,
         (FLAT if sensor.wiggle is None else sensor.wiggle[0]).straight,
         _shift_turns(shift_m, unambiguous_m, len(valid)),
         amplitude,
@@ -188,17 +189,25 @@ def _walked(
     return DepthFrame(depth_m, sound, strength, opposed, unambiguous_m)
 
 
+def _angle_into(cosine: np.ndarray, sine: np.ndarray) -> np.ndarray:
+    """Phase in [-pi, pi], in the memory of `cosine`."""
+    angle = torch.from_numpy(cosine)
+    torch.atan2(torch.from_numpy(sine), angle, out=angle)
+    return cosine
+
+
 def _map_of(value: Tensor | float, shape: Sequence[int]) -> np.ndarray:
     """A number, or a map that is common to a batch, for every pixel of it."""
-    maps = value if isinstance(value, Tensor) else torch.tensor(value)
-    return array(maps.expand(shape))
+    if not isinstance(value, Tensor):
+        return np.full(shape, value, np.float32)
+    return array(value if value.shape == shape else value.expand(shape))
 
 
 def _shift_turns(shift_m: Tensor | None, unambiguous_m: float, batch: int) -> np.ndarray:
-    if shift_m is None:
-        return np.zeros(batch, np.float32)
-    turns = shift_m.remainder(unambiguous_m) / unambiguous_m
-    return array(turns.expand(batch))
+    """A shift of each frame, float32 [B], as a share of the unambiguous range."""
+    metres = np.zeros(batch) if shift_m is None else shift_m.numpy()
+    turns = np.remainder(metres, unambiguous_m) / unambiguous_m
+    return np.broadcast_to(turns, batch).astype(np.float32)
 
 
 def decode_at(

@@ -115,7 +115,7 @@ def merge_pixels(
             # A look into a table keeps a loop from taking many pixels at once: it has its own.
             for j in range(columns):
                 place = first + bins_per_rad * angle[j]
-                line = np.int32(place)
+                line = np.uint32(place)  # A sign would have to be looked at.
                 out[j] = constant[line] + slope[line] * place + shift_turns[b]
             for j in range(columns):
                 wrapped_m = (out[j] - np.floor(out[j])) * TWO_PI * metres_per_rad

@@ -4,6 +4,7 @@ from shotenv.sensor.acquire import (
     Sensitivity,
     acquire,
     expose,
+    light_of,
     scored_pixels,
     sensitivity,
 )
@@ -25,6 +26,7 @@ __all__ = [
     "electrons_per_radiance_second",
     "expose",
     "imager_temperature_k",
+    "light_of",
     "noise_samples",
     "residual_drift_m",
     "sample_noise_lsb",

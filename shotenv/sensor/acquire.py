@@ -57,9 +57,9 @@ def expose(
     shots = Shots(shots)
     check_exposure(exposure, shots)
     check_settings(exposure, shots, laser_power_w, integration_s, noise)
-    per_light = sensitivity(sensor, laser_power_w, integration_s)
     samples = None if noise is None else noise.unbind(1)
-    return acquire(exposure, per_light, sensor, shots=shots, noise=samples, offsets=offsets)
+    light = light_of(exposure, sensitivity(sensor, laser_power_w, integration_s))
+    return acquire(light, sensor, shots=shots, noise=samples, offsets=offsets)
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,7 @@ def sensitivity(sensor: SensorConfig, laser_power_w: Tensor, integration_s: Tens
 
 
 def acquire(
-    exposure: Exposure,
-    per_light: Sensitivity,
+    light: Light,
     sensor: SensorConfig,
     *,
     shots: Shots,
@@ -99,8 +98,8 @@ def acquire(
     Sample after sample, so that what one sample needs stays in the processor's cache; `noise`
     gives the normals [B, 2, H, W] of each.
     """
-    shape = batch, height, width = exposure.active.shape
-    light, pixel = _light(exposure, per_light), pixel_of(sensor)
+    shape = batch, height, width = light.active.shape
+    pixel = pixel_of(sensor)
     if offsets is None:
         offsets = OffsetPattern(torch.zeros(shape), torch.zeros(shape))
         pixel = pixel._replace(ambient_lsb_per_e=np.float32(0))
@@ -115,20 +114,20 @@ def acquire(
     return RawFrame(torch.from_numpy(dcs_lsb), torch.from_numpy(saturated))
 
 
-def scored_pixels(exposure: Exposure, per_light: Sensitivity, sensor: SensorConfig) -> Tensor:
+def scored_pixels(light: Light, truth_m: Tensor, sensor: SensorConfig) -> Tensor:
     """Pixels that count, bool [B, H, W], whatever is measured there.
 
-    Truth within `max_range_m`, noise-free signal to noise of one sample,
+    Truth [B, H, W] within `max_range_m`, noise-free signal to noise of one sample,
     `m S / sqrt(S + B + 2 sigma_r^2)`, above `min_snr`.
     """
-    scored = np.empty(exposure.active.shape, np.bool_)
+    scored = np.empty(light.active.shape, np.bool_)
     limits = np.float32(sensor.max_range_m), np.float32(sensor.min_snr)
-    light, truth_m = _light(exposure, per_light), array(exposure.distance_m)
-    strong_pixels(light, pixel_of(sensor), truth_m, *limits, scored)
+    strong_pixels(light, pixel_of(sensor), array(truth_m), *limits, scored)
     return torch.from_numpy(scored)
 
 
-def _light(exposure: Exposure, per_light: Sensitivity) -> Light:
+def light_of(exposure: Exposure, per_light: Sensitivity) -> Light:
+    """Light as the loops over pixels take it, of exposures in memory."""
     return Light(
         correlation=array(exposure.correlation),
         active=array(exposure.active),

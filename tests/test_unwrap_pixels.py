@@ -1,0 +1,128 @@
+"""Correction by compiled loops: what the chains of array operations give, pixel by pixel."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from unwrap import correction, pixels
+from unwrap.acquisition import Shots, harmonic_weights
+from unwrap.calibration import FLAT, wiggle_of
+from unwrap.correction import MERGES, SensorDescription, correct
+from unwrap.frames import RawFrame
+
+SHAPE = (3, 12, 37)
+WIGGLE = (wiggle_of(harmonic_weights(0.3, 7)), FLAT)
+
+
+def drawn(count, seed=0):
+    """Samples of weak and strong pixels, some of them saturated."""
+    random = torch.Generator().manual_seed(seed)
+    batch, *size = SHAPE
+    strength = 10 ** (3 * torch.rand(batch, 1, *size, generator=random))
+    dcs = (strength * torch.randn(batch, count, *size, generator=random)).round()
+    return RawFrame(dcs, torch.rand(SHAPE, generator=random) < 0.1)
+
+
+def maps(scale, seed=1):
+    return scale * torch.rand(SHAPE, generator=torch.Generator().manual_seed(seed))
+
+
+@pytest.fixture
+def both(monkeypatch):
+    """Corrects by loops and by array operations."""
+
+    def run(*words, **fields):
+        assert correction._can_walk(*words[:2])
+        walked = correct(*words, **fields)
+        with monkeypatch.context() as patch:
+            patch.setattr(correction, "_can_walk", lambda *maps: False)
+            return walked, correct(*words, **fields)
+
+    return run
+
+
+@pytest.mark.parametrize("merge", MERGES)
+@pytest.mark.parametrize("wiggle", [None, WIGGLE])
+@pytest.mark.parametrize("count", [2, 4])
+def test_loops_equal_array_operations(both, count, wiggle, merge):
+    sensor = SensorDescription(wiggle=wiggle, min_snr=1.5)
+    known = {
+        "offset_lsb": maps(6.0, 2) - 3.0,
+        "noise_lsb": maps(40.0, 3),
+        "shift_m": torch.tensor([0.1, -0.2, 9.0], dtype=torch.float64),
+    }
+    loops, arrays = both(drawn(count), maps(25.0), sensor, merge=merge, **known)
+    assert 0.1 < loops.valid.float().mean() < 0.9
+    torch.testing.assert_close(loops.amplitude, arrays.amplitude, rtol=1e-6, atol=1e-5)
+    assert torch.equal(loops.valid, arrays.valid)
+    # A pixel may lie within the rounding of a float of where two candidates meet.
+    apart_m = (loops.distance_m - arrays.distance_m).abs()
+    assert int((apart_m > 1e-5).sum()) <= 1
+    assert (loops.residual is None) == (count == 2)
+    if count == 4:
+        torch.testing.assert_close(loops.residual, arrays.residual)
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_what_is_common_to_a_batch_serves_every_frame(both, count):
+    sensor, common = SensorDescription(noise_lsb=20.0), maps(6.0)[0]
+    loops, arrays = both(drawn(count), maps(25.0), sensor, offset_lsb=common)
+    torch.testing.assert_close(loops.distance_m, arrays.distance_m, rtol=0, atol=1e-5)
+    assert torch.equal(loops.valid, arrays.valid)
+    shifted = both(drawn(count), maps(25.0), sensor, shift_m=torch.tensor([0.3]))
+    torch.testing.assert_close(*(frame.distance_m for frame in shifted), rtol=0, atol=1e-5)
+
+
+def test_nothing_that_is_given_is_changed():
+    raw, predicted_m, offset = drawn(4), maps(25.0), maps(6.0)
+    before = [values.clone() for values in (raw.dcs_lsb, raw.saturated, predicted_m, offset)]
+    correct(raw, predicted_m, SensorDescription(), offset_lsb=offset)
+    after = (raw.dcs_lsb, raw.saturated, predicted_m, offset)
+    assert all(map(torch.equal, before, after))
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_an_unsound_sample_is_named(wrong):
+    raw = drawn(2)
+    raw.dcs_lsb[1, 0, 4, 5] = wrong
+    with pytest.raises(ValueError, match=r"dcs holds (NaN|an infinity) at \[1, 0, 4, 5\]"):
+        correct(raw, maps(25.0), SensorDescription())
+
+
+def test_other_values_take_the_array_operations():
+    raw, predicted_m = drawn(2), maps(25.0)
+    assert not correction._can_walk(drawn(8), predicted_m)
+    assert not correction._can_walk(raw, predicted_m.double())
+    assert not correction._can_walk(raw, predicted_m.requires_grad_())
+    assert not correction._can_walk(raw, predicted_m[0])
+
+
+def test_loops_equal_their_python():
+    """Compiled or not: the rules of IEEE 754, in the order written."""
+    raw, found = drawn(Shots.FOUR), []
+    for decode, merge in (
+        (pixels.decode_pixels, pixels.merge_pixels),
+        (pixels.decode_pixels.py_func, pixels.merge_pixels.py_func),
+    ):
+        made = np.zeros((5, *SHAPE), np.float32)
+        valid = np.zeros(SHAPE, np.bool_)
+        assert decode(raw.dcs_lsb.numpy(), maps(6.0).numpy(), *made[:4])
+        merge(
+            np.arctan2(made[1], made[0]),
+            WIGGLE[0].straight,
+            np.float32([0.0, 0.4, 0.9]),
+            made[2],
+            maps(40.0).numpy(),
+            raw.saturated.numpy(),
+            maps(25.0).numpy(),
+            pixels.Limits(*map(np.float32, (6.25, 6.2, 1.0))),
+            pixels.NEAREST,
+            made[4],
+            valid,
+        )
+        found.append((made, valid))
+    (compiled, good), (python, sound) = found
+    np.testing.assert_array_equal(compiled, python)
+    np.testing.assert_array_equal(good, sound)
