@@ -62,6 +62,14 @@ def test_strong_pixels_and_noise_are_those_of_the_python_loop(light, pixel, draw
     assert np.array_equal(*noise)
 
 
+def test_gray_words_are_those_of_the_python_loop(pixel, draw):
+    light, normals = draw((2, ROWS, COLUMNS)), draw((2, ROWS, COLUMNS), -3.0, 3.0)
+    words = [np.zeros((2, ROWS, COLUMNS), np.int32) for _ in range(2)]
+    for take, into in zip((pixels.take_gray, pixels.take_gray.py_func), words, strict=True):
+        take(light, np.float32([2e4, 1e5]), normals, pixel._replace(low_lsb=np.float32(0)), into)
+    assert np.array_equal(*words) and words[0].std() > 10
+
+
 def test_scores_and_features_are_those_of_the_python_loops(draw):
     frames = (2, ROWS, COLUMNS)
     truth_m, distance_m = draw(frames, 0.0, 25.0), draw(frames, 0.0, 25.0)

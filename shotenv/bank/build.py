@@ -37,7 +37,7 @@ if TYPE_CHECKING:  # How worlds are drawn and rendered is loaded where it is don
     from shotenv.render import RenderedFrame
     from shotenv.world.model import World
 
-RENDERING_VERSION = 2
+RENDERING_VERSION = 3
 """Raised when the same configuration would give other light: old banks are then left alone."""
 
 SECONDS_PER_MILLION_RAYS = 0.5

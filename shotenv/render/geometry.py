@@ -34,6 +34,8 @@ class Faces:
         In the world; of what moves in the coordinates of its thing. M is at least one.
     thing : int64 [M]
         Which of the world's things a moving face belongs to.
+    radius_m : float64 [K]
+        Of each thing, from the origin of its coordinates to its farthest corner.
     normals : float32 [S, 4]
         Unit normals of the static faces and a zero.
     surface : float32 [S + M, 4]
@@ -46,6 +48,7 @@ class Faces:
     still: int
     corners: np.ndarray
     thing: np.ndarray
+    radius_m: np.ndarray
     normals: np.ndarray
     surface: np.ndarray
     uv: np.ndarray
@@ -100,6 +103,7 @@ def faces_of(world: World) -> Faces:
         still=len(still),
         corners=np.concatenate([mesh.corners for mesh in meshes]),
         thing=np.repeat(np.arange(len(moving)), [len(mesh.corners) for mesh in moving]),
+        radius_m=np.array([_radius_m(mesh) for mesh in moving]),
         normals=normals,
         surface=np.concatenate([_surface(mesh) for mesh in meshes]),
         uv=np.concatenate([_edges_uv(mesh) for mesh in meshes]),
@@ -111,13 +115,18 @@ def posed(world: World, faces: Faces, times_s: Sequence[float], bounces: int) ->
     own, (turns, places) = faces.corners[faces.still :], _poses(world, times_s)
     corners = np.empty((len(times_s), *own.shape), np.float32)
     normals = np.zeros((*corners.shape[:2], 4), np.float32)
-    radius_m = _reach_from(world.ego.at(times_s[0]), own, faces.thing, turns, places)
-    tile_m = tile_grid(len(times_s), spacing_m=radius_m + (bounces + 1) * REACH_M)
+    away_m = np.abs(places - world.ego.at(times_s[0]).position_m)[..., :2].max(axis=-1)
+    farthest_m = float((away_m + faces.radius_m).max())
+    tile_m = tile_grid(len(times_s), spacing_m=farthest_m + (bounces + 1) * REACH_M)
     _pose(own, faces.thing, turns, places, tile_m, corners, normals)
     still, moves = np.split(faces.is_pane, [faces.still])
     still_panes = faces.corners[: faces.still][still] + tile_m[:, None, None, :]
     panes = np.concatenate([still_panes.astype(np.float32), corners[:, moves]], axis=1)
     return Posed(corners, normals, panes.reshape(-1, 3, 3), tile_m.astype(np.float32))
+
+
+def _radius_m(mesh: Mesh) -> float:
+    return float(np.linalg.norm(mesh.corners, axis=-1).max(initial=0.0))
 
 
 def _poses(world: World, times_s: Sequence[float]) -> tuple[Array, Array]:
@@ -127,13 +136,6 @@ def _poses(world: World, times_s: Sequence[float]) -> tuple[Array, Array]:
     turns = [[rotation(pose) for pose in row] for row in poses]
     places = [[pose.position_m for pose in row] for row in poses]
     return np.array(turns), np.array(places)
-
-
-def _reach_from(eye: Pose, own: Array, thing: Array, turns: Array, places: Array) -> float:
-    """Largest distance along x or y from the eye to what moves, at any instant, metres."""
-    bounds = np.array([[math.inf] * 3, [-math.inf] * 3])
-    _find_bounds(own, thing, turns, places, bounds)
-    return float(np.abs(bounds - eye.position_m)[:, :2].max())
 
 
 def tile_grid(count: int, spacing_m: float) -> np.ndarray:
@@ -164,19 +166,6 @@ def _normal(first, second, third):
     length = np.sqrt(x * x + y * y + z * z)
     scale = length if length > 0.0 else 1.0
     return x / scale, y / scale, z / scale
-
-
-@loop
-def _find_bounds(own: Array, thing: Array, turns: Array, places: Array, bounds: Array) -> None:
-    """Widen bounds [2, 3] to hold the faces of things at all instants; see `_pose`."""
-    for t in range(len(turns)):
-        for face in range(len(own)):
-            for corner in range(3):
-                turn, place = turns[t, thing[face]], places[t, thing[face]]
-                point = _in_world(turn, place, own[face, corner])
-                for axis in range(3):
-                    bounds[0, axis] = min(bounds[0, axis], point[axis])
-                    bounds[1, axis] = max(bounds[1, axis], point[axis])
 
 
 @loop

@@ -7,9 +7,10 @@ import torch
 from torch import Tensor
 
 from shotenv.config import SensorConfig
+from shotenv.sensor.acquire import pixel_of
 from shotenv.sensor.converter import full_scale_lsb
 from shotenv.sensor.electrons import electrons_per_radiance_second
-from shotenv.sensor.pixels import noise_by_gray
+from shotenv.sensor.pixels import noise_by_gray, take_gray
 from unwrap.compiled import array
 
 SHORTEST_EXPOSURE_S = 1e-5
@@ -37,15 +38,17 @@ def capture_gray(
         Exposure time of each image, seconds.
     """
     exposure_s = gray_exposure_s(ambient, sensor)
-    rate = electrons_per_radiance_second(sensor)
-    charge_e = ambient * (rate * exposure_s)[:, None, None]
-    if noise is not None:
-        # As for a tap: the packet is its own variance, see `shotenv.sensor.pixels`.
-        packet_e = charge_e + sensor.read_noise_e**2
-        charge_e = packet_e.addcdiv(noise, packet_e.rsqrt()).sub_(sensor.read_noise_e**2)
-    held_e = charge_e.clamp_(max=sensor.full_well_e)
-    words = (held_e * gray_gain_lsb_per_e(sensor)).round_()
-    return words.clamp_(0, full_scale_lsb(sensor.adc_bits)).to(torch.int32), exposure_s
+    per_light_e = exposure_s * electrons_per_radiance_second(sensor)
+    pixel = pixel_of(sensor)._replace(
+        gain_lsb_per_e=np.float32(gray_gain_lsb_per_e(sensor)),
+        low_lsb=np.float32(0),
+        high_lsb=np.float32(full_scale_lsb(sensor.adc_bits)),
+    )
+    if noise is None:
+        noise, pixel = torch.zeros(ambient.shape), pixel._replace(read_variance_e=np.float32(0))
+    words = np.empty(ambient.shape, np.int32)
+    take_gray(array(ambient), array(per_light_e), array(noise), pixel, words)
+    return torch.from_numpy(words), exposure_s
 
 
 def gray_exposure_s(ambient: Tensor, sensor: SensorConfig) -> Tensor:

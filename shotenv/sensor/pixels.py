@@ -156,6 +156,32 @@ def take_sample(
 
 
 @loop
+def take_gray(
+    ambient: Array, per_light_e: Array, normals: Array, pixel: Pixel, words: Array
+) -> None:
+    """Gray words of B frames: one tap, noise, full well, converter.
+
+    Parameters
+    ----------
+    ambient, normals : float32 [B, H, W]
+    per_light_e : float32 [B]
+        Electrons per ambient radiance.
+    words : integer [B, H, W]
+        Are written.
+    """
+    frames, rows, columns = words.shape
+    for b in range(frames):
+        for i in range(rows):
+            for j in range(columns):
+                charge_e = ambient[b, i, j] * per_light_e[b]
+                read_e = noisy_e(packet_e(charge_e, pixel.read_variance_e), normals[b, i, j])
+                held_e = min(read_e - pixel.read_variance_e, pixel.full_well_e)
+                words[b, i, j] = word_lsb(
+                    held_e * pixel.gain_lsb_per_e, pixel.low_lsb, pixel.high_lsb
+                )
+
+
+@loop
 def strong_pixels(
     light: Light, pixel: Pixel, truth_m: Array, range_m: np.float32, snr: np.float32, strong: Array
 ) -> None:

@@ -6,6 +6,7 @@ band: irradiance W m-2, radiance W m-2 sr-1, radiant intensity W sr-1. No render
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,11 +74,12 @@ class Motion:
     def at(self, time_s: float) -> Pose:
         """Pose at `time_s`."""
         turned = self.yaw_rate_rad_s * time_s
-        # Chord of the arc: length speed * t * sinc(turn / 2), direction start yaw + turn / 2.
-        chord = self.speed_m_s * time_s * float(np.sinc(turned / (2 * np.pi)))
-        heading = self.start.yaw_rad + turned / 2
+        # Chord of the arc: speed * t * sin(h) / h in the direction start yaw + h, h half the turn.
+        half = turned / 2
+        chord = self.speed_m_s * time_s * (math.sin(half) / half if half else 1.0)
+        heading = self.start.yaw_rad + half
         x, y, z = self.start.position_m
-        moved = (x + chord * float(np.cos(heading)), y + chord * float(np.sin(heading)), z)
+        moved = (x + chord * math.cos(heading), y + chord * math.sin(heading), z)
         return Pose(moved, self.start.yaw_rad + turned, self.start.pitch_rad)
 
 
