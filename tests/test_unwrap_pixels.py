@@ -11,6 +11,7 @@ from unwrap.acquisition import Shots, harmonic_weights
 from unwrap.calibration import FLAT, wiggle_of
 from unwrap.correction import MERGES, SensorDescription, correct
 from unwrap.frames import RawFrame
+from unwrap.phase import decode
 
 SHAPE = (3, 12, 37)
 WIGGLE = (wiggle_of(harmonic_weights(0.3, 7)), FLAT)
@@ -34,11 +35,11 @@ def both(monkeypatch):
     """Corrects by loops and by array operations."""
 
     def run(*words, **fields):
-        assert correction._can_walk(*words[:2])
-        walked = correct(*words, **fields)
+        assert correction._can_loop(*words[:2])
+        looped = correct(*words, **fields)
         with monkeypatch.context() as patch:
-            patch.setattr(correction, "_can_walk", lambda *maps: False)
-            return walked, correct(*words, **fields)
+            patch.setattr(correction, "_can_loop", lambda *maps: False)
+            return looped, correct(*words, **fields)
 
     return run
 
@@ -75,6 +76,18 @@ def test_what_is_common_to_a_batch_serves_every_frame(both, count):
     torch.testing.assert_close(*(frame.distance_m for frame in shifted), rtol=0, atol=1e-5)
 
 
+@pytest.mark.parametrize("count", [2, 4])
+def test_decoding_takes_any_leading_shape(count):
+    random = torch.Generator().manual_seed(4)
+    dcs = torch.randn(2, 3, count, 5, 7, generator=random)
+    offset = torch.randn(3, 5, 7, generator=random)
+    loops, arrays = decode(dcs, offset_lsb=offset), decode(dcs.double(), offset_lsb=offset.double())
+    for name in ("phase_rad", "amplitude", "residual")[: 2 + (count == 4)]:
+        found, expected = getattr(loops, name), getattr(arrays, name).float()
+        torch.testing.assert_close(found, expected, rtol=0, atol=2e-6)
+    assert decode(dcs[0, 0]).phase_rad.shape == (5, 7)
+
+
 def test_nothing_that_is_given_is_changed():
     raw, predicted_m, offset = drawn(4), maps(25.0), maps(6.0)
     before = [values.clone() for values in (raw.dcs_lsb, raw.saturated, predicted_m, offset)]
@@ -93,10 +106,10 @@ def test_an_unsound_sample_is_named(wrong):
 
 def test_other_values_take_the_array_operations():
     raw, predicted_m = drawn(2), maps(25.0)
-    assert not correction._can_walk(drawn(8), predicted_m)
-    assert not correction._can_walk(raw, predicted_m.double())
-    assert not correction._can_walk(raw, predicted_m.requires_grad_())
-    assert not correction._can_walk(raw, predicted_m[0])
+    assert not correction._can_loop(drawn(8), predicted_m)
+    assert not correction._can_loop(raw, predicted_m.double())
+    assert not correction._can_loop(raw, predicted_m.requires_grad_())
+    assert not correction._can_loop(raw, predicted_m[0])
 
 
 def test_loops_equal_their_python():

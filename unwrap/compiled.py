@@ -7,7 +7,7 @@ order in which it is written: every processor gives the same numbers to the last
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numba
@@ -42,3 +42,22 @@ def inlined(function: Function) -> Function:
 def array(tensor: Tensor, dtype: type | None = np.float32) -> np.ndarray:
     """The memory of `tensor` as a contiguous array; a copy where it is not, or of another type."""
     return np.ascontiguousarray(tensor.numpy(), dtype)
+
+
+def array_of(value: Tensor | float, shape: Sequence[int]) -> np.ndarray:
+    """A number, or a map that is common to several frames, as float32 of each pixel."""
+    if isinstance(value, (int, float)):
+        return np.full(shape, value, np.float32)
+    return array(value if value.shape == shape else value.expand(shape))
+
+
+def can_loop(*tensors: Tensor) -> bool:
+    """Whether loops may work on `tensors`: float32 in memory, without gradients or a tracer."""
+    import torch
+
+    if torch.compiler.is_compiling() or torch.jit.is_tracing():
+        return False
+    return all(
+        tensor.is_cpu and tensor.dtype == torch.float32 and not tensor.requires_grad
+        for tensor in tensors
+    )

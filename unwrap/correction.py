@@ -6,7 +6,7 @@ frequencies, and need the prediction only where these disagree.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,21 +16,19 @@ from torch import Tensor
 
 from unwrap.acquisition import SAMPLES_PER_FREQUENCY, Shots
 from unwrap.calibration import FLAT, WiggleTable, shift_turns
-from unwrap.compiled import array
+from unwrap.compiled import array, array_of, can_loop
 from unwrap.dual import unwrap_dual
 from unwrap.frames import DepthFrame, PhaseFrame, RawFrame
 from unwrap.merge import merge_nearest, merge_none, merge_regression
 from unwrap.phase import (
     angle_of,
+    components,
     distance_m,
     phase_of_turns,
-    quadratures_of,
-    sound_samples,
-    strength_of,
     turns_of,
     unambiguous_range_m,
 )
-from unwrap.pixels import RULES, Limits, decode_pixels, merge_pixels
+from unwrap.pixels import RULES, Limits, merge_pixels
 
 Merge = Literal["nearest", "floor", "none"]
 MERGES: dict[Merge, Callable[[Tensor, Tensor, float, float], Tensor]] = {
@@ -114,14 +112,14 @@ def correct(
     if merge not in MERGES:
         raise ValueError(f"merge is {merge!r}; expected one of {', '.join(MERGES)}")
     noise = sensor.noise_lsb if noise_lsb is None else noise_lsb
-    if predicted_m is not None and _can_walk(raw, predicted_m):
-        return _walked(raw, predicted_m, sensor, merge, offset_lsb, noise, shift_m)
+    if predicted_m is not None and _can_loop(raw, predicted_m):
+        return _looped(raw, predicted_m, sensor, merge, offset_lsb, noise, shift_m)
     first = decode_at(0, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
     # Weights 0 and 1 in floats: comparing into a bool and converting it is several times slower.
     valid = torch.sub(first.amplitude, noise, alpha=sensor.min_snr).ge_(0)
     valid.gt_(raw.saturation)
     if raw.shots == Shots.EIGHT:
-        second = quadratures_of(_samples_at(1, raw, offset_lsb))
+        second = components(_samples_at(1, raw), offset_lsb)[:2]
         merged_m, residual_m = unwrap_dual(
             first.phase_rad,
             phase_at(1, *second, sensor, shift_m=shift_m),
@@ -142,17 +140,13 @@ def correct(
     return _frame(merged_m, valid, first, predicted_m, sensor)
 
 
-def _can_walk(raw: RawFrame, predicted_m: Tensor) -> bool:
-    """Whether `unwrap.pixels` may do the work: plain values in memory, of two or four samples."""
-    if raw.shots == Shots.EIGHT or torch.compiler.is_compiling() or torch.jit.is_tracing():
-        return False
-    maps = (raw.dcs_lsb, predicted_m)
-    plain = all(values.is_cpu and values.dtype == torch.float32 for values in maps)
+def _can_loop(raw: RawFrame, predicted_m: Tensor) -> bool:
+    """Whether `unwrap.pixels` may do the work: two or four samples, in memory."""
     fits = raw.dcs_lsb.ndim == 4 and predicted_m.shape == raw.saturated.shape
-    return plain and fits and not predicted_m.requires_grad
+    return raw.shots != Shots.EIGHT and fits and can_loop(raw.dcs_lsb, predicted_m)
 
 
-def _walked(
+def _looped(
     raw: RawFrame,
     predicted_m: Tensor,
     sensor: SensorDescription,
@@ -161,46 +155,26 @@ def _walked(
     noise_lsb: Tensor | float,
     shift_m: Tensor | None,
 ) -> DepthFrame:
-    """`correct` by the compiled loops of `unwrap.pixels`."""
-    shape = raw.saturated.shape
-    cosine, sine = np.empty((2, *shape), np.float32)
-    amplitude, residual = np.empty((2, *shape), np.float32)
-    offset = _map_of(0.0 if offset_lsb is None else offset_lsb, shape)
-    if not decode_pixels(array(raw.dcs_lsb), offset, cosine, sine, amplitude, residual):
-        sound_samples(raw.dcs_lsb, None)  # Says where they are not.
-    angle_rad, valid = _angle_into(cosine, sine), np.empty(shape, np.bool_)
-    # What is in the processor's cache need not be fetched.
-    distance_m, unambiguous_m = sine, unambiguous_range_m(sensor.f1_hz)
+    """`correct` by compiled loops."""
+    cosine, sine, amplitude, residual = components(raw.dcs_lsb, offset_lsb)
+    # The quadratures lend their memory: what is in the processor's cache need not be fetched.
+    angle_rad, distance_m = torch.atan2(sine, cosine, out=cosine), sine
+    valid = torch.empty_like(raw.saturated)
+    unambiguous_m = unambiguous_range_m(sensor.f1_hz)
     merge_pixels(
-        angle_rad,
+        array(angle_rad),
         (FLAT if sensor.wiggle is None else sensor.wiggle[0]).straight,
         _shift_turns(shift_m, unambiguous_m, len(valid)),
-        amplitude,
-        _map_of(noise_lsb, shape),
+        array(amplitude),
+        array_of(noise_lsb, valid.shape),
         array(raw.saturated, np.bool_),
         array(predicted_m),
         Limits(*map(np.float32, (unambiguous_m, sensor.saturation_range_m, sensor.min_snr))),
         RULES.index(merge),
-        distance_m,
-        valid,
+        array(distance_m),
+        array(valid, np.bool_),
     )
-    depth_m, sound, strength = map(torch.from_numpy, (distance_m, valid, amplitude))
-    opposed = torch.from_numpy(residual) if raw.shots == Shots.FOUR else None
-    return DepthFrame(depth_m, sound, strength, opposed, unambiguous_m)
-
-
-def _angle_into(cosine: np.ndarray, sine: np.ndarray) -> np.ndarray:
-    """Phase in [-pi, pi], in the memory of `cosine`."""
-    angle = torch.from_numpy(cosine)
-    torch.atan2(torch.from_numpy(sine), angle, out=angle)
-    return cosine
-
-
-def _map_of(value: Tensor | float, shape: Sequence[int]) -> np.ndarray:
-    """A number, or a map that is common to a batch, for every pixel of it."""
-    if not isinstance(value, Tensor):
-        return np.full(shape, value, np.float32)
-    return array(value if value.shape == shape else value.expand(shape))
+    return DepthFrame(distance_m, valid, amplitude, residual, unambiguous_m)
 
 
 def _shift_turns(shift_m: Tensor | None, unambiguous_m: float, batch: int) -> np.ndarray:
@@ -223,15 +197,14 @@ def decode_at(
     `shift_m` [B] is added to the wrapped distances: minus the drift that a real sensor's
     temperature tells; or what its compensation leaves, where samples are simulated without drift.
     """
-    samples = _samples_at(frequency, raw, offset_lsb)
-    quadratures = quadratures_of(samples)
-    phase_rad = phase_at(frequency, *quadratures, sensor, shift_m=shift_m)
-    return PhaseFrame(phase_rad, *strength_of(samples, *quadratures))
+    cosine, sine, amplitude, residual = components(_samples_at(frequency, raw), offset_lsb)
+    phase_rad = phase_at(frequency, cosine, sine, sensor, shift_m=shift_m)
+    return PhaseFrame(phase_rad, amplitude, residual)
 
 
-def _samples_at(frequency: int, raw: RawFrame, offset_lsb: Tensor | None) -> Tensor:
+def _samples_at(frequency: int, raw: RawFrame) -> Tensor:
     start = frequency * SAMPLES_PER_FREQUENCY
-    return sound_samples(raw.dcs_lsb[:, start : start + SAMPLES_PER_FREQUENCY], offset_lsb)
+    return raw.dcs_lsb[:, start : start + SAMPLES_PER_FREQUENCY]
 
 
 def phase_at(

@@ -12,8 +12,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from unwrap.compiled import array, array_of, can_loop
 from unwrap.frames import PhaseFrame
 from unwrap.frequencies import SPEED_OF_LIGHT_M_S, unambiguous_range_m
+from unwrap.pixels import decode_pixels
 
 __all__ = ["SPEED_OF_LIGHT_M_S", "TWO_PI", "decode", "distance_m", "unambiguous_range_m"]
 
@@ -45,43 +47,49 @@ def decode(dcs: Tensor, *, offset_lsb: Tensor | None = None) -> PhaseFrame:
     ValueError
         Another number of samples, another dtype, or a NaN or infinity; the message says where.
     """
-    samples = sound_samples(dcs, offset_lsb)
-    quadratures = quadratures_of(samples)
-    phase_rad = phase_of_turns(turns_of(angle_of(*quadratures)))
-    return PhaseFrame(phase_rad, *strength_of(samples, *quadratures))
+    cosine, sine, amplitude, residual = components(dcs, offset_lsb)
+    phase_rad = phase_of_turns(turns_of(angle_of(cosine, sine)))
+    return PhaseFrame(phase_rad, amplitude, residual)
 
 
-def sound_samples(dcs: Tensor, offset_lsb: Tensor | None) -> Tensor:
-    """Samples [..., n, H, W], refused if they are unsound, without their offset [..., H, W]."""
-    _check(dcs)
-    return dcs if offset_lsb is None else dcs - offset_lsb.unsqueeze(-3)
+def components(
+    dcs: Tensor, offset_lsb: Tensor | None = None
+) -> tuple[Tensor, Tensor, Tensor, Tensor | None]:
+    """Cosine, sine, amplitude and residual, see `decode`, which says what is refused."""
+    _check_kind(dcs)
+    if can_loop(dcs):
+        return _looped(dcs, offset_lsb)
+    _check_values(dcs)
+    samples = dcs if offset_lsb is None else dcs - offset_lsb.unsqueeze(-3)
+    if samples.shape[-3] == 2:
+        cosine, sine = samples.unbind(-3)
+        return cosine, sine, _length(cosine, sine), None
+    first, second, third, fourth = samples.unbind(-3)
+    cosine, sine = first - third, second - fourth
+    residual = torch.maximum((first + third).abs(), (second + fourth).abs())
+    return cosine, sine, _length(cosine, sine) / 2, residual
 
 
-def quadratures_of(samples: Tensor) -> tuple[Tensor, Tensor]:
-    """Cosine and sine [..., H, W]: D0 - D2 and D1 - D3 of four samples, D0 and D1 of two."""
-    maps = samples.unbind(-3)
-    if len(maps) == 2:
-        return maps[0], maps[1]
-    return maps[0] - maps[2], maps[1] - maps[3]
+def _length(cosine: Tensor, sine: Tensor) -> Tensor:
+    """As `torch.hypot`, which files of networks do not know."""
+    return (cosine * cosine).addcmul(sine, sine).sqrt()
+
+
+def _looped(dcs: Tensor, offset_lsb: Tensor | None) -> tuple[Tensor, Tensor, Tensor, Tensor | None]:
+    """`components` by one compiled walk."""
+    *leading, count, height, width = dcs.shape
+    samples, shape = dcs.reshape(-1, count, height, width), (*leading, height, width)
+    offset = array_of(0.0 if offset_lsb is None else offset_lsb, shape)
+    maps = np.empty((4, len(samples), height, width), np.float32)
+    if not decode_pixels(array(samples), offset.reshape(maps[0].shape), *maps):
+        _check_values(dcs)
+    cosine, sine, amplitude, residual = torch.from_numpy(maps).view(4, *shape).unbind()
+    return cosine, sine, amplitude, residual if count == 4 else None
 
 
 def angle_of(cosine: Tensor, sine: Tensor) -> Tensor:
     """Phase in [-pi, pi]."""
     return torch.atan2(sine, cosine)
-
-
-def strength_of(samples: Tensor, cosine: Tensor, sine: Tensor) -> tuple[Tensor, Tensor | None]:
-    """Amplitude and residual of samples, see `PhaseFrame`.
-
-    The quadratures of four samples, which are not needed any more, lend their memory: what is
-    in the processor's cache need not be fetched.
-    """
-    if samples.shape[-3] == 2:
-        return (cosine * cosine).addcmul_(sine, sine).sqrt_(), None
-    amplitude = cosine.mul_(cosine).addcmul_(sine, sine).sqrt_().mul_(0.5)
-    first, second, third, fourth = samples.unbind(-3)
-    residual = torch.add(first, third, out=sine).abs_()
-    return amplitude, torch.maximum(residual, (second + fourth).abs_(), out=residual)
 
 
 def turns_of(phase_rad: Tensor) -> Tensor:
@@ -97,11 +105,14 @@ def phase_of_turns(turns: Tensor) -> Tensor:
     return turns.frac_().mul_(TWO_PI)
 
 
-def _check(dcs: Tensor) -> None:
+def _check_kind(dcs: Tensor) -> None:
     if not dcs.is_floating_point():
         raise ValueError(f"dcs is {dcs.dtype}; expected a floating-point tensor")
     if dcs.ndim < 3 or dcs.shape[-3] not in (2, 4):
         raise ValueError(f"dcs has shape {tuple(dcs.shape)}; expected [..., 2 or 4, H, W]")
+
+
+def _check_values(dcs: Tensor) -> None:
     if torch.compiler.is_compiling():
         return  # A graph, such as an exported one, is made before there are values.
     # A sum is one pass and is finite unless a sample is not (or samples are absurdly large).
