@@ -115,13 +115,13 @@ def test_other_values_take_the_array_operations():
 def test_loops_equal_their_python():
     """Compiled or not: the rules of IEEE 754, in the order written."""
     raw, found = drawn(Shots.FOUR), []
-    for decode, merge in (
+    for walk, merge in (
         (pixels.decode_pixels, pixels.merge_pixels),
         (pixels.decode_pixels.py_func, pixels.merge_pixels.py_func),
     ):
         made = np.zeros((5, *SHAPE), np.float32)
         valid = np.zeros(SHAPE, np.bool_)
-        assert decode(raw.dcs_lsb.numpy(), maps(6.0).numpy(), *made[:4])
+        assert walk(raw.dcs_lsb.numpy(), maps(6.0).numpy(), *made[:4])
         merge(
             np.arctan2(made[1], made[0]),
             WIGGLE[0].straight,

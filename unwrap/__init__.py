@@ -1,4 +1,4 @@
-"""From raw samples of an indirect time-of-flight sensor to depth. Pure torch; usable alone."""
+"""From raw samples of an indirect time-of-flight sensor to depth. Usable alone."""
 
 from __future__ import annotations
 
