@@ -20,8 +20,6 @@ FAMILY_COLORS = {
     "tunnel": "#cfd3dd",
     "night_road": "#b7bfdc",
 }
-LABEL_OFFSETS_PX = (50, 76, 102, 128, 154)
-"""Labels stand below the whiskers; policies of about the same energy have theirs apart."""
 FONT = {"family": "Inter, system-ui, 'Segoe UI', Roboto, sans-serif", "size": 13, "color": INK}
 CONFIG = {"displaylogo": False, "responsive": True, "displayModeBar": False}
 
@@ -37,6 +35,9 @@ def error_against_energy(results: dict[str, Any]) -> go.Figure:
     by_energy = sorted(
         results["policies"].items(), key=lambda item: item[1]["laser_energy_j"]["mean"]
     )
+    top_m = max(policy["depth_mae_m"]["high"] for _, policy in by_energy)
+    # Each label in a row of its own, left of its line: no line crosses another policy's label.
+    row_m = top_m / 16
     for place, (name, policy) in enumerate(by_energy):
         energy, error = policy["laser_energy_j"], policy["depth_mae_m"]
         chosen = name == results["scheduler"]
@@ -61,10 +62,13 @@ def error_against_energy(results: dict[str, Any]) -> go.Figure:
             arrowhead=0,
             standoff=7,
             ax=0,
-            ay=LABEL_OFFSETS_PX[place % len(LABEL_OFFSETS_PX)],
+            ayref="y",
+            ay=top_m + row_m * (1 + place),
+            xanchor="right",
         )
     figure.update_xaxes(title="laser energy per drive, J", rangemode="tozero", **AXIS)
-    figure.update_yaxes(title="mean absolute depth error, m", rangemode="tozero", **AXIS)
+    span_m = [0, top_m + row_m * (len(by_energy) + 1)]
+    figure.update_yaxes(title="mean absolute depth error, m", range=span_m, **AXIS)
     return _styled(figure, height=430, showlegend=False)
 
 
