@@ -96,6 +96,20 @@ def test_nothing_that_is_given_is_changed():
     assert all(map(torch.equal, before, after))
 
 
+def test_maps_may_lie_in_memory_in_any_order():
+    raw, predicted_m = drawn(2), maps(25.0)
+    turned = RawFrame(*(turned_in_memory(values) for values in (raw.dcs_lsb, raw.saturated)))
+    expected = correct(raw, predicted_m, SensorDescription())
+    found = correct(turned, turned_in_memory(predicted_m), SensorDescription())
+    assert torch.equal(found.distance_m, expected.distance_m)
+    assert torch.equal(found.valid, expected.valid)
+
+
+def turned_in_memory(values):
+    """The same values, their columns side by side in memory instead of their rows."""
+    return values.transpose(-1, -2).contiguous().transpose(-1, -2)
+
+
 @pytest.mark.parametrize("wrong", [np.nan, np.inf])
 def test_an_unsound_sample_is_named(wrong):
     raw = drawn(2)

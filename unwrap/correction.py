@@ -159,7 +159,7 @@ def _looped(
     cosine, sine, amplitude, residual = components(raw.dcs_lsb, offset_lsb)
     # The quadratures lend their memory: what is in the processor's cache need not be fetched.
     angle_rad, distance_m = torch.atan2(sine, cosine, out=cosine), sine
-    valid = torch.empty_like(raw.saturated)
+    valid = torch.empty(raw.saturated.shape, dtype=torch.bool)
     unambiguous_m = unambiguous_range_m(sensor.f1_hz)
     merge_pixels(
         array(angle_rad),
