@@ -67,8 +67,9 @@ def score_depth(
     ValueError
         The maps have different shapes.
     """
-    shapes = [tuple(maps.shape) for maps in (distance_m, valid, truth_m, scored)]
-    if len(set(shapes)) > 1:
+    shape = distance_m.shape
+    if not shape == valid.shape == truth_m.shape == scored.shape:
+        shapes = [tuple(maps.shape) for maps in (distance_m, valid, truth_m, scored)]
         raise ValueError(f"distance_m, valid, truth_m and scored are {shapes}; expected one shape")
     score = np.empty((5, len(distance_m)))
     _score(

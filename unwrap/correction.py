@@ -179,9 +179,10 @@ def _looped(
 
 def _shift_turns(shift_m: Tensor | None, unambiguous_m: float, batch: int) -> np.ndarray:
     """A shift of each frame, float32 [B], as a share of the unambiguous range."""
-    metres = np.zeros(batch) if shift_m is None else shift_m.numpy()
-    turns = np.remainder(metres, unambiguous_m) / unambiguous_m
-    return np.broadcast_to(turns, batch).astype(np.float32)
+    turns = np.zeros(batch, np.float32)
+    if shift_m is not None:
+        turns[:] = shift_m.numpy() % unambiguous_m / unambiguous_m
+    return turns
 
 
 def decode_at(

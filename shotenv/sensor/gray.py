@@ -72,8 +72,9 @@ def sample_noise_lsb(
     own shot noise is left out; it matters only where the signal is strong anyway.
     """
     squared_gain = sensor.gain_lsb_per_e**2
-    per_word = integration_s / exposure_s * (squared_gain / gray_gain_lsb_per_e(sensor))
+    gain, per_word = squared_gain / gray_gain_lsb_per_e(sensor), np.empty(len(gray), np.float32)
+    per_word[:] = integration_s.numpy() / exposure_s.numpy() * gain
     dark = 2.0 * squared_gain * sensor.read_noise_e**2
     noise_lsb = np.empty(gray.shape, np.float32)
-    noise_by_gray(array(gray, None), array(per_word.expand(len(gray))), np.float32(dark), noise_lsb)
+    noise_by_gray(array(gray, None), per_word, np.float32(dark), noise_lsb)
     return torch.from_numpy(noise_lsb)
