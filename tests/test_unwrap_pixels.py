@@ -88,6 +88,14 @@ def test_decoding_takes_any_leading_shape(count):
     assert decode(dcs[0, 0]).phase_rad.shape == (5, 7)
 
 
+@pytest.mark.parametrize("noise", [20, 20.0, np.float32(20), torch.tensor(20.0)])
+def test_one_noise_serves_all_pixels(noise):
+    raw, predicted_m = drawn(2), maps(25.0)
+    found = correct(raw, predicted_m, SensorDescription(), noise_lsb=noise)
+    expected = correct(raw, predicted_m, SensorDescription(), noise_lsb=torch.full(SHAPE, 20.0))
+    assert torch.equal(found.valid, expected.valid)
+
+
 def test_nothing_that_is_given_is_changed():
     raw, predicted_m, offset = drawn(4), maps(25.0), maps(6.0)
     before = [values.clone() for values in (raw.dcs_lsb, raw.saturated, predicted_m, offset)]

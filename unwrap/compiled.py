@@ -46,7 +46,7 @@ def array(tensor: Tensor, dtype: type | None = np.float32) -> np.ndarray:
 
 def array_of(value: Tensor | float, shape: Sequence[int]) -> np.ndarray:
     """A number, or a map that is common to several frames, as float32 of each pixel."""
-    if isinstance(value, (int, float)):
+    if isinstance(value, (int, float, np.number)):
         return np.full(shape, value, np.float32)
     return array(value if value.shape == shape else value.expand(shape))
 
