@@ -17,7 +17,10 @@ from shotenv.sensor import (
     draw_offsets,
     electrons_per_radiance_second,
     expose,
+    light_of,
     sample_noise_lsb,
+    scored_pixels,
+    sensitivity,
     stream,
     stream_seed,
 )
@@ -101,6 +104,11 @@ def test_one_sensor_serves_a_batch_of_frames(sensor):
     two = OffsetPattern(*(torch.cat([offsets.pattern_lsb] * 2) for _ in range(2)))
     with pytest.raises(RuntimeError, match="expand"):
         noise_free(three, sensor, offsets=two, batch=3)
+    with pytest.raises(RuntimeError, match="expand"):
+        capture_gray(three.ambient, sensor, noise=torch.zeros_like(three.ambient[:2]))
+    light = light_of(three, sensitivity(sensor, torch.full((3,), 7.0), torch.full((3,), 6e-4)))
+    with pytest.raises(ValueError, match=r"truth_m is \(1, "):
+        scored_pixels(light, one.distance_m, sensor)
     gray, exposure_s = capture_gray(three.ambient, sensor, noise=None)
     noise_lsb = sample_noise_lsb(gray, exposure_s[:1], torch.tensor([6e-4]), sensor)
     assert torch.equal(noise_lsb, noise_lsb[:1].expand(3, -1, -1))

@@ -132,6 +132,8 @@ def test_other_values_take_the_array_operations():
     assert not correction._can_loop(raw, predicted_m.double())
     assert not correction._can_loop(raw, predicted_m.requires_grad_())
     assert not correction._can_loop(raw, predicted_m[0])
+    with pytest.raises(RuntimeError, match="must match"):
+        correct(RawFrame(raw.dcs_lsb[..., 1:], raw.saturated), predicted_m, SensorDescription())
 
 
 def test_loops_equal_their_python():

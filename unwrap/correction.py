@@ -142,8 +142,10 @@ def correct(
 
 def _can_loop(raw: RawFrame, predicted_m: Tensor) -> bool:
     """Whether `unwrap.pixels` may do the work: two or four samples, in memory."""
-    fits = raw.dcs_lsb.ndim == 4 and predicted_m.shape == raw.saturated.shape
-    return raw.shots != Shots.EIGHT and fits and can_loop(raw.dcs_lsb, predicted_m)
+    samples = raw.dcs_lsb
+    # A loop trusts shapes.
+    fits = samples.ndim == 4 and samples[:, 0].shape == raw.saturated.shape == predicted_m.shape
+    return raw.shots != Shots.EIGHT and fits and can_loop(samples, predicted_m)
 
 
 def _looped(

@@ -119,7 +119,14 @@ def scored_pixels(light: Light, truth_m: Tensor, sensor: SensorConfig) -> Tensor
 
     Truth [B, H, W] within `max_range_m`, noise-free signal to noise of one sample,
     `m S / sqrt(S + B + 2 sigma_r^2)`, above `min_snr`.
+
+    Raises
+    ------
+    ValueError
+        The truth is not of the light's shape.
     """
+    if truth_m.shape != light.active.shape:
+        raise ValueError(f"truth_m is {tuple(truth_m.shape)}; expected {light.active.shape}")
     scored = np.empty(light.active.shape, np.bool_)
     limits = np.float32(sensor.max_range_m), np.float32(sensor.min_snr)
     strong_pixels(light, pixel_of(sensor), array(truth_m), *limits, scored)

@@ -47,7 +47,7 @@ def capture_gray(
     if noise is None:
         noise, pixel = torch.zeros(ambient.shape), pixel._replace(read_variance_e=np.float32(0))
     words = np.empty(ambient.shape, np.int32)
-    take_gray(array(ambient), array(per_light_e), array(noise), pixel, words)
+    take_gray(array(ambient), array(per_light_e), array(noise.expand_as(ambient)), pixel, words)
     return torch.from_numpy(words), exposure_s
 
 
