@@ -70,7 +70,7 @@ def kill_at_a_random_moment(process: subprocess.Popen, folder, moment: random.Ra
     before = standing(folder)
     while standing(folder) == before and process.poll() is None:
         time.sleep(0.01)
-    time.sleep(moment.uniform(0.0, 0.1))
+    time.sleep(moment.uniform(0.0, 0.05))
     process.send_signal(signal.SIGKILL)
     process.communicate()
 
@@ -102,6 +102,7 @@ def test_workers_and_threads_change_no_bit(config, uninterrupted, tmp_path):
     assert read_manifest(tmp_path / "bank") == read_manifest(uninterrupted)
 
 
+@pytest.mark.slow
 def test_a_script_without_a_main_guard_renders_once_and_ends(config, tmp_path):
     """Workers must not run the script that started them: it would wait for itself."""
     script = tmp_path / "script.py"

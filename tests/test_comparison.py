@@ -122,6 +122,7 @@ def test_full_width_is_trained_beside_the_table_s_own():
     assert all("width 64" in t.label for t in wide)
 
 
+@pytest.mark.slow
 def test_the_table_is_made_once_and_goes_on_where_it_stopped(tiny_bank, tmp_path, monkeypatch):
     networks = ("tofregnet", "tofsegnet", "phasenet", "toffusionnet")
     config = TableConfig(bank=tiny_bank, width=4, epochs=1, batch_size=8, networks=networks)

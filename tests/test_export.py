@@ -172,6 +172,7 @@ def test_the_floor_merge_of_classes_is_equation_8(tmp_path, segmenting):
     assert (np.abs(found["distance_m"] - expected_m.numpy()) < 1e-3).mean() > 0.999
 
 
+@pytest.mark.slow
 def test_a_large_frame_is_thinned_inside_the_file(tmp_path, segmenting):
     small = {"trained_height": HEIGHT // 2, "trained_width": WIDTH // 2}
     unwrapper, path = load_unwrapper(segmenting), tmp_path / "small.safetensors"
