@@ -7,6 +7,7 @@ at known speeds), so no renderer is needed.
 from __future__ import annotations
 
 import math
+import signal
 
 import numpy as np
 import pytest
@@ -35,6 +36,14 @@ AMBIENT_IRRADIANCE_W_M2 = {
     "tunnel": 0.1,
     "night_road": 1e-4,
 }
+
+
+@pytest.fixture(autouse=True, scope="session")
+def ctrl_c_interrupts():
+    """Also where the tests were started in the background of a script, which ignores Ctrl-C."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(autouse=True, scope="session")
