@@ -23,6 +23,7 @@ from lightning.pytorch.loggers import TensorBoardLogger
 from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from torch import Tensor
 
+from unwrap.allocator import keep_freed_memory
 from unwrap.correction import SensorDescription
 from unwrap.data import (
     Batch,
@@ -196,6 +197,8 @@ def train(
         Ctrl-C; the checkpoint is kept.
     """
     frames, validation, device = sources("train"), sources("validation"), training_device()
+    if device.type == "cpu":
+        keep_freed_memory()
     shots, size = config.shown_shots, config.batch_size
     order = EpochShuffle(len(frames), size, shots, config.seed)
     judged = in_order(validation, size, shots, draw=JUDGED_DRAW)
