@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,8 +20,6 @@ from unwrap.unwrapper import Unwrapper, load_unwrapper
 PAPERS: tuple[NetworkName, ...] = ("tofregnet", "tofsegnet")
 PEERS: tuple[NetworkName, ...] = ("su_net", "phasenet", "agresti_net", "chen_net")
 RecipeName = Literal["paper", "ours"]
-FULL_WIDTH = 64
-"""Channels of the first stage as published, those of ResNet18."""
 
 
 class TableConfig(Section):
@@ -30,17 +28,12 @@ class TableConfig(Section):
     bank: str = Field("nearfield", description="name or path of the bank")
     sensor: str = Field("epc660", description="name or path of the sensor that looks at it")
     stride: int = Field(1, ge=1, le=8, description="every how many rows and columns are used")
-    width: int = Field(
-        FULL_WIDTH, ge=4, le=128, description="channels of the networks' first stage"
-    )
+    width: int = Field(64, ge=4, le=128, description="channels of the networks' first stage")
     epochs: int = Field(150, ge=1, description="passes over the training frames")
     batch_size: int = Field(32, ge=1, description="frames per step")
     learning_rate: Positive = Field(3e-3, description="highest learning rate, one rise and fall")
     networks: tuple[NetworkName, ...] = Field(
         (*PAPERS, *PEERS, "toffusionnet"), description="networks that are trained and judged"
-    )
-    full_width: tuple[NetworkName, ...] = Field(
-        (), description=f"networks trained by clip and rendered truth at width {FULL_WIDTH}, too"
     )
     seed: int = Field(0, ge=0, description="seed of weights, order and augmentation")
 
@@ -56,21 +49,17 @@ class Training:
     recipe : "paper" or "ours"
         Losses and flips as published, or ours; see `RECIPES`.
     config : TrainConfig
-    wide : bool
-        One of those at `FULL_WIDTH` beside those of the table's own width.
     """
 
     label: str
     recipe: RecipeName
     config: TrainConfig
-    wide: bool = False
 
     @property
     def folder(self) -> str:
         """Its place below the folder of the table."""
         config = self.config
-        name = f"{config.network}-{self.recipe}-{config.split_by}-{config.truth}"
-        return f"{name}-width-{config.width}" if self.wide else name
+        return f"{config.network}-{self.recipe}-{config.split_by}-{config.truth}"
 
 
 RECIPES: dict[RecipeName, dict[str, Any]] = {
@@ -91,8 +80,7 @@ LABELS: dict[str, str] = {
 def trainings(config: TableConfig) -> Iterator[Training]:
     """The paper's networks on both splits and both truths, the others on clips and rendered truth.
 
-    TofRegNet also with our loss, which is what the shipped weights are trained with. Last those of
-    `full_width`, with the paper's recipe if it has one.
+    TofRegNet also with our loss, which is what the shipped weights are trained with.
     """
     for network in config.networks:
         if network not in PAPERS:
@@ -103,10 +91,6 @@ def trainings(config: TableConfig) -> Iterator[Training]:
                 yield _training(config, network, "paper", split_by=split_by, truth=truth)
         if network == "tofregnet":
             yield _training(config, network, "ours")
-    wide = config.model_copy(update={"width": FULL_WIDTH})
-    for network in config.full_width:
-        training = _training(wide, network, "paper" if network in PAPERS else "ours")
-        yield replace(training, label=f"{training.label}, width {FULL_WIDTH}", wide=True)
 
 
 def _training(

@@ -106,7 +106,7 @@ def _page(config: TableConfig, rows: list[Row]) -> str:
     )
     return template.render(
         config=config.model_dump(mode="json"),
-        small=config.width < FULL.width or config.epochs < FULL.epochs,
+        small=config.width < FULL.width or config.epochs < FULL.epochs or config.stride > 1,
         f1_hz=sensor.f1_hz,
         unambiguous_m=unambiguous_range_m(sensor.f1_hz),
         max_range_m=sensor.max_range_m,
@@ -122,7 +122,6 @@ def _write_figure(networks: dict[Training, Unwrapper], path: Path) -> None:
         training.label: network
         for training, network in networks.items()
         if (training.config.split_by, training.config.truth) == ("clip", "rendered")
-        and not training.wide
         and training.config.network in ("tofregnet", "tofsegnet", "toffusionnet")
     }
     frames = sources(next(iter(networks)).config)("test")

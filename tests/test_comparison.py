@@ -13,7 +13,7 @@ from agents.comparing import (
     classical_methods,
     rows_of,
 )
-from agents.comparison import FULL_WIDTH, TableConfig, trainings
+from agents.comparison import TableConfig, trainings
 from agents.tabling import FIGURE, NUMBERS, PAGE, make_table
 from shotenv.bank import open_bank
 from shotenv.resolve import env_config
@@ -107,19 +107,6 @@ def test_the_paper_s_networks_are_trained_on_both_splits_and_truths():
     assert len({t.folder for t in planned}) == len(planned) == 8 + 1 + 4 + 1
     budgets = {(t.config.epochs, t.config.batch_size, t.config.width) for t in planned}
     assert len(budgets) == 1
-
-
-def test_full_width_is_trained_beside_the_table_s_own():
-    config = TableConfig(width=8, full_width=("tofregnet", "toffusionnet"))
-    planned = list(trainings(config))
-    wide = [t for t in planned if t.config.width == FULL_WIDTH]
-    assert [(t.config.network, t.recipe) for t in wide] == [
-        ("tofregnet", "paper"),
-        ("toffusionnet", "ours"),
-    ]
-    assert len({t.folder for t in planned}) == len(planned)
-    assert all((t.config.split_by, t.config.truth) == ("clip", "rendered") for t in wide)
-    assert all("width 64" in t.label for t in wide)
 
 
 @pytest.mark.slow
