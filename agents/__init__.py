@@ -1,1 +1,5 @@
 """Who chooses the shots: policies, training, evaluation, statistics, report, command line."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -17,15 +17,16 @@ from torch import Tensor
 
 from benchmarks.rows import row
 from benchmarks.turns import alternately
-from unwrap.allocator import keep_freed_memory
-from unwrap.correction import SensorDescription
-from unwrap.inference import Prepared
-from unwrap.network import Settings, arithmetic
-from unwrap.sensed import Sensed, Truth
-from unwrap.train import TrainConfig, TrainingModule
-from unwrap.unwrapper import Unwrapper, load_unwrapper
-from unwrap.weights import save_weights
-from unwrap.zoo import build
+from unwrap.networks.base import Settings, arithmetic
+from unwrap.networks.engines import Prepared
+from unwrap.networks.predictor import Unwrapper, load_unwrapper
+from unwrap.networks.registry import build
+from unwrap.networks.weight_files import save_weights
+from unwrap.signal.description import SensorDescription
+from unwrap.signal.sensed import Sensed, Truth
+from unwrap.training.allocator import keep_freed_memory
+from unwrap.training.config import TrainConfig
+from unwrap.training.loop import TrainingModule
 
 HEIGHT, WIDTH, CHANNELS = 240, 320, 64
 SINGLE_GOAL, BATCH_GOAL, TRAINING_GOAL, OUTSIDE_GOAL = 0.65, 0.70, 0.50, 0.05

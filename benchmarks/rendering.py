@@ -16,12 +16,14 @@ from typing import Any
 import numpy as np
 
 from benchmarks.rows import row
-from shotenv.config import CameraConfig, SensorConfig, WorldConfig, find_config, read_config
-from shotenv.render import FrameRenderer
-from shotenv.render.llvm import start_mitsuba
-from shotenv.world import draw_world
-from shotenv.world.model import World
-from unwrap.acquisition import Shots
+from shotenv.config.bank import CameraConfig, WorldConfig
+from shotenv.config.reader import find_config, read_config
+from shotenv.config.sensor import SensorConfig
+from shotenv.render.backend.llvm import start_mitsuba
+from shotenv.render.frame import FrameRenderer
+from shotenv.world.draw import draw_world
+from shotenv.world.geometry.model import World
+from unwrap.signal.shots import Shots
 
 GOALS = {(160, 120): 1.3, (320, 240): 1.15}
 """Largest ratio by width and height: in a small frame the building of scenes weighs more."""

@@ -4,14 +4,15 @@ Importing this package registers `shotenv/ShotSchedule-v0`; it loads neither tor
 """
 
 import gymnasium
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 ENV_ID = "shotenv/ShotSchedule-v0"
-
-__all__ = ["ENV_ID"]
 
 if ENV_ID not in gymnasium.registry:
     gymnasium.register(
         id=ENV_ID,
         entry_point="shotenv.env:ShotScheduleEnv",
-        vector_entry_point="shotenv.vector_env:ShotScheduleVectorEnv",
+        vector_entry_point="shotenv.env:ShotScheduleVectorEnv",
     )

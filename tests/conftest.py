@@ -14,16 +14,19 @@ import pytest
 import torch
 
 from shotenv.bank.store import write_clip, write_manifest
-from shotenv.config import FAMILIES, BankConfig, SensorConfig, find_config, read_config
-from shotenv.sensor import capture_gray
-from unwrap.acquisition import (
+from shotenv.config.bank import BankConfig
+from shotenv.config.families import FAMILIES
+from shotenv.config.reader import find_config, read_config
+from shotenv.config.sensor import SensorConfig
+from shotenv.sensor.gray import capture_gray
+from unwrap.networks.tofregnet import TofRegNet
+from unwrap.networks.weight_files import save_weights
+from unwrap.signal.shots import (
     demodulation_phase_rad,
     frequency_index,
     harmonic_weights,
     sample_times_s,
 )
-from unwrap.nets import TofRegNet
-from unwrap.weights import save_weights
 
 SPEED_OF_LIGHT_M_S = 299_792_458.0
 HEIGHT, WIDTH = 24, 32

@@ -1,18 +1,9 @@
-"""From raw samples of an indirect time-of-flight sensor to depth. Usable alone."""
+"""From raw samples of an indirect time-of-flight sensor to depth. Usable alone.
 
-from __future__ import annotations
+Public names are listed in `__init__.pyi`, here and in every room, and loaded when they are asked
+for: importing this package loads no torch.
+"""
 
-from typing import Any
+import lazy_loader
 
-_PUBLIC = ("Prediction", "SensorDescription", "Unwrapper", "correct", "load_unwrapper")
-
-__all__ = list(_PUBLIC)
-
-
-def __getattr__(name: str) -> Any:
-    """Public names, imported on first use so that `import unwrap` loads no torch."""
-    if name not in _PUBLIC:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    import unwrap.unwrapper
-
-    return getattr(unwrap.unwrapper, name)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -20,11 +20,11 @@ from figures.stage import (
     label,
     phase_of,
 )
-from unwrap.acquisition import harmonic_weights
-from unwrap.calibration import correlation_samples, wiggle_of
-from unwrap.dual import unwrap_dual
-from unwrap.frequencies import candidate_spacing_m, unambiguous_range_m
-from unwrap.phase import TWO_PI, decode
+from unwrap.depth.dual import unwrap_dual
+from unwrap.signal.decoding import TWO_PI, decode
+from unwrap.signal.frequencies import candidate_spacing_m, unambiguous_range_m
+from unwrap.signal.shots import harmonic_weights
+from unwrap.signal.wiggle import correlation_samples, wiggle_of
 
 
 def wiggle() -> Made:

@@ -35,11 +35,12 @@ from figures.stage import (
     wall_return,
     world,
 )
-from shotenv.frames import Exposure
-from shotenv.sensor import electrons_per_radiance_second
-from shotenv.world.meshes import join
-from unwrap.acquisition import Shots
-from unwrap.phase import TWO_PI, decode, distance_m, unambiguous_range_m
+from shotenv.sensor.electrons import electrons_per_radiance_second
+from shotenv.sensor.exposure import Exposure
+from shotenv.world.geometry.meshes import join
+from unwrap.signal.decoding import TWO_PI, decode, distance_m
+from unwrap.signal.frequencies import unambiguous_range_m
+from unwrap.signal.shots import Shots
 
 
 def _wrapped_m(correlation: np.ndarray) -> np.ndarray:

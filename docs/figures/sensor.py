@@ -30,22 +30,16 @@ from figures.stage import (
     show,
     world,
 )
-from shotenv.config import merged
-from shotenv.sensor import (
-    Purpose,
-    capture_gray,
-    distance_drift_m,
-    draw_noise,
-    draw_offsets,
-    electrons_per_radiance_second,
-    residual_drift_m,
-    stream,
-)
-from shotenv.sensor.gray import gray_gain_lsb_per_e
-from unwrap.acquisition import Shots
-from unwrap.calibration import shifted
-from unwrap.frequencies import unambiguous_range_m
-from unwrap.phase import decode, distance_m
+from shotenv.config.reader import merged
+from shotenv.sensor.drift import distance_drift_m, residual_drift_m
+from shotenv.sensor.electrons import electrons_per_radiance_second
+from shotenv.sensor.gray import capture_gray, gray_gain_lsb_per_e
+from shotenv.sensor.noise import Purpose, draw_noise, stream
+from shotenv.sensor.offsets import draw_offsets
+from unwrap.signal.decoding import decode, distance_m
+from unwrap.signal.frequencies import unambiguous_range_m
+from unwrap.signal.shots import Shots
+from unwrap.signal.wiggle import shifted
 
 
 def photon_transfer() -> Made:

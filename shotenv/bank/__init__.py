@@ -4,48 +4,6 @@
 user's cache folder on first use; `open_bank("path/to/bank")` opens a folder.
 """
 
-from __future__ import annotations
+import lazy_loader
 
-from pathlib import Path
-
-from shotenv.bank.reader import Bank, BankFrame, Clip
-from shotenv.bank.store import MANIFEST, BankError
-from shotenv.config import BankConfig, ConfigError, find_config, read_config
-
-__all__ = ["Bank", "BankError", "BankFrame", "Clip", "open_bank"]
-
-
-def open_bank(bank: str | Path, *, render: bool = True) -> Bank:
-    """Open a bank by name or path.
-
-    Parameters
-    ----------
-    bank
-        A folder that holds a bank, or a configuration: a name in `configs/bank/` or the path of
-        a YAML file.
-    render
-        Render a configured bank first where it does not stand yet; otherwise it is an error.
-
-    Raises
-    ------
-    BankError
-        Neither a bank nor a configuration, or a damaged bank; the message names file and cure.
-    """
-    if Path(bank).is_dir() and (Path(bank) / MANIFEST).is_file():
-        return Bank(Path(bank))
-    try:
-        path = find_config("bank", str(bank))
-    except ConfigError as error:
-        raise BankError(f"{error}, or of the folder of a bank") from None
-    from shotenv.bank.build import bank_folder, build_bank, clips_standing
-
-    config = read_config(BankConfig, path)
-    if render:
-        return Bank(build_bank(config))
-    standing, clips = clips_standing(config)
-    if not (bank_folder(config) / MANIFEST).is_file():
-        raise BankError(
-            f"bank {config.name} is not rendered yet ({standing} of {clips} clips stand); "
-            f"`shotenv render --config {path}` does it"
-        )
-    return Bank(bank_folder(config))
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -27,15 +27,13 @@ from shotenv.bank.store import (
     write_manifest,
 )
 from shotenv.config import BankConfig, Family, Split
-from shotenv.progress import progress, say
-from shotenv.render.llvm import require_device
-from shotenv.render.workers import available_cores, run_jobs
-from unwrap.acquisition import Shots
-from unwrap.files import write_json
+from shotenv.render.backend import available_cores, require_device, run_jobs
+from unwrap.signal import Shots
+from unwrap.support import progress, say, write_json
 
 if TYPE_CHECKING:  # How worlds are drawn and rendered is loaded where it is done.
     from shotenv.render import RenderedFrame
-    from shotenv.world.model import World
+    from shotenv.world.geometry import World
 
 RENDERING_VERSION = 3
 """Raised when the same configuration would give other light: old banks are then left alone."""
@@ -271,7 +269,7 @@ def _render_frames(
     Before the first frame comes a coarse look, as a light meter takes it.
     """
     from shotenv.render import FrameRenderer
-    from shotenv.sensor.gray import gray_exposure_s
+    from shotenv.sensor import gray_exposure_s
 
     camera, sensor = config.camera, config.sensor
     coarse = {"width": camera.width // METER_REDUCTION, "height": camera.height // METER_REDUCTION}

@@ -14,8 +14,8 @@ from torch import Tensor
 
 from shotenv.bank.store import ARRAYS, BankError, Manifest, read_manifest
 from shotenv.config import Split
-from shotenv.frames import Exposure
-from unwrap.splits import RANDOM_SPLITS, random_split
+from shotenv.sensor import Exposure
+from unwrap.training import RANDOM_SPLITS, random_split
 
 OPEN_CLIPS = 128
 """Clips kept mapped at a time; each holds one file descriptor per array."""

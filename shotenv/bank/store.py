@@ -23,7 +23,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from shotenv.config import BankConfig, Split, one_sentence
-from unwrap.files import write_json
+from unwrap.support import write_json
 
 SCHEMA_VERSION: Final = 1
 MANIFEST, CLIP_RECORD = "manifest.json", "clip.json"

@@ -9,8 +9,8 @@ import torch
 from torch import Tensor
 
 from shotenv.config import ROOM_K, LaserConfig
-from shotenv.frames import ShotCost
 from shotenv.laser.ageing import ageing_rate
+from shotenv.laser.cost import ShotCost
 
 Array = Any
 SECONDS_PER_HOUR = 3600.0

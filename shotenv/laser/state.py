@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from shotenv.config import LaserConfig
-from shotenv.frames import ShotCost
+from shotenv.laser.cost import ShotCost
 from shotenv.laser.thermal import case_step, junction_step, relaxed, trip_step
 
 

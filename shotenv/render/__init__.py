@@ -5,18 +5,6 @@
 processes.
 """
 
-from shotenv.render.frame import FrameRenderer, RenderedFrame, render_frame
-from shotenv.render.instants import Instants, frame_instants
-from shotenv.render.llvm import RendererError, find_llvm, require_device, require_llvm
+import lazy_loader
 
-__all__ = [
-    "FrameRenderer",
-    "Instants",
-    "RenderedFrame",
-    "RendererError",
-    "find_llvm",
-    "frame_instants",
-    "render_frame",
-    "require_device",
-    "require_llvm",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

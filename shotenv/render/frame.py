@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shotenv.config import CameraConfig, SensorConfig
+from shotenv.render.backend import start_mitsuba
 from shotenv.render.instants import frame_instants
-from shotenv.render.llvm import start_mitsuba
-from unwrap.acquisition import harmonic_weights
+from unwrap.signal import harmonic_weights
 
 if TYPE_CHECKING:  # Worker processes start without loading how worlds are drawn.
-    from shotenv.world.model import World
+    from shotenv.world.geometry import World
 
 
 @dataclass(frozen=True)
 class RenderedFrame:
-    """Noise-free light of one frame; the arrays of `shotenv.frames.Exposure` without a batch.
+    """Noise-free light of one frame; the arrays of `shotenv.sensor.exposure.Exposure` without a batch.
 
     Attributes
     ----------

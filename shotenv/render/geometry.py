@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shotenv.world.model import Mesh, Motion, Pose, World
-from unwrap.compiled import inlined, loop
+from shotenv.world.geometry import Mesh, Motion, Pose, World
+from unwrap.support import inlined, loop
 
 Array = np.ndarray
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from shotenv.config import CameraConfig, SensorConfig
-from unwrap.acquisition import Shots, demodulation_phase_rad, frequency_index, sample_times_s
+from unwrap.signal import Shots, demodulation_phase_rad, frequency_index, sample_times_s
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def frame_instants(
 ) -> Instants:
     """Instants of a frame that starts at `time_s`: eight samples, then the gray exposure.
 
-    The samples start at the times of `unwrap.acquisition`; the gray instants are the midpoints of
+    The samples start at the times of `unwrap.signal.shots`; the gray instants are the midpoints of
     equal parts of the gray exposure (None: the longest), which ends where the first sample starts.
     """
     samples = [time_s + t for t in sample_times_s(Shots.EIGHT, sensor.sample_period_s)]

@@ -25,7 +25,7 @@ from shotenv.render.modulation import FUNDAMENTAL, Harmonics, Modulation
 from shotenv.render.pinhole import Pinhole
 from shotenv.render.sampling import Lanes, Sampler
 from shotenv.render.scene import SURFACE_OFFSET_M, Hit, Scene, Surroundings
-from shotenv.world.model import World
+from shotenv.world.geometry import World
 
 _RETRO_COS = 0.5
 
@@ -67,7 +67,7 @@ def trace(
     """Trace `camera.samples_per_pixel` paths per pixel and instant, in one kernel launch.
 
     The laser sits at the camera and shines evenly over the field of view. `harmonics` are those
-    of the correlation, see `unwrap.acquisition.harmonic_weights`; `surroundings` are those of the
+    of the correlation, see `unwrap.signal.shots.harmonic_weights`; `surroundings` are those of the
     same world, where frames of it have been traced before. The result depends on the arguments
     alone, bit for bit on one machine.
     """

@@ -14,11 +14,11 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from shotenv.render.device import only_where, upload
+from shotenv.render.backend import only_where, upload
 from shotenv.render.geometry import REACH_M, rotation
 from shotenv.render.instants import Instants
 from shotenv.render.scene import Hit, Scene
-from shotenv.world.model import MAX_LAMPS, Indoor, Lamp, World
+from shotenv.world.geometry import MAX_LAMPS, Indoor, Lamp, World
 
 _LAMP_NUMBERS = 12
 

@@ -8,7 +8,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from shotenv.render.device import upload
+from shotenv.render.backend import upload
 from shotenv.render.instants import Instants
 
 SPEED_OF_LIGHT_M_S = 299_792_458.0

@@ -10,10 +10,10 @@ import mitsuba as mi
 import numpy as np
 
 from shotenv.config import CameraConfig
-from shotenv.render.device import upload
+from shotenv.render.backend import upload
 from shotenv.render.geometry import rotation
 from shotenv.render.instants import Instants
-from shotenv.world.model import Motion
+from shotenv.world.geometry import Motion
 
 
 def half_extents(camera: CameraConfig) -> tuple[float, float]:

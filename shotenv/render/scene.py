@@ -9,10 +9,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from shotenv.render.device import only_where, upload
+from shotenv.render.backend import only_where, upload
 from shotenv.render.geometry import REACH_M, Posed, faces_of
 from shotenv.render.texture import noise_texture
-from shotenv.world.model import World
+from shotenv.world.geometry import World
 
 SURFACE_OFFSET_M = 1e-3
 """How far from a surface a ray leaves it, so that it does not hit the surface itself."""

@@ -15,7 +15,7 @@ from shotenv.config import CameraConfig
 from shotenv.render.geometry import faces_of, posed, rotation
 from shotenv.render.scene import triangle_mesh
 from shotenv.render.texture import noise_texture
-from shotenv.world.model import Light, Pose, World
+from shotenv.world.geometry import Light, Pose, World
 
 _NEAR_CLIP_M = 1e-5
 _FILM = {"type": "hdrfilm", "pixel_format": "luminance"}

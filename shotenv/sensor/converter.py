@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from unwrap.words import mid_scale
+from unwrap.signal import mid_scale
 
 
 def signed_limits_lsb(bits: int) -> tuple[float, float]:
-    """Samples of the lowest and the highest word, which report overflow; see `unwrap.words`."""
+    """Samples of the lowest and the highest word, which report overflow; see `unwrap.signal.words`."""
     middle = mid_scale(bits)
     return 0.0 - middle, full_scale_lsb(bits) - middle
 

@@ -7,11 +7,11 @@ import torch
 from torch import Tensor
 
 from shotenv.config import SensorConfig
-from shotenv.sensor.acquire import pixel_of
+from shotenv.sensor.acquisition import pixel_of
 from shotenv.sensor.converter import full_scale_lsb
 from shotenv.sensor.electrons import electrons_per_radiance_second
 from shotenv.sensor.pixels import noise_by_gray, take_gray
-from unwrap.compiled import array
+from unwrap.support import array
 
 SHORTEST_EXPOSURE_S = 1e-5
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from unwrap.compiled import inlined, loop
+from unwrap.support import inlined, loop
 
 Array = np.ndarray
 HALF, ZERO = np.float32(0.5), np.float32(0.0)

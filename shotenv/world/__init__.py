@@ -1,5 +1,5 @@
 """A seed becomes a world: geometry, materials, lights, motion. Knows no renderer."""
 
-from shotenv.world.draw import draw_world
+import lazy_loader
 
-__all__ = ["draw_world"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shotenv.config import Family, Range, WorldConfig
-from shotenv.world import construction, enclosed, forest, lights, roads, snow, warehouse
-from shotenv.world.model import Light, Motion, Pose, World
-from shotenv.world.site import Site
-from shotenv.world.weather import draw_weather
+from shotenv.config import Family, WorldConfig
+from shotenv.world.families import construction, enclosed, forest, roads, snow, warehouse
+from shotenv.world.geometry import Light, Motion, Pose, Site, World, draw_weather, lights
+from unwrap.support import Range
 
 DrawLight = Callable[[np.random.Generator], Light]
 

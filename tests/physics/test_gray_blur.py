@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from render_worlds import SMALL, mesh, ray_directions, square, world
 
-from shotenv.render import render_frame
-from shotenv.world.model import Motion, MovingObject, Pose
+from shotenv.render.frame import render_frame
+from shotenv.world.geometry.model import Motion, MovingObject, Pose
 
 pytestmark = pytest.mark.render
 DISTANCE_M, SPEED_M_S, SIDE_M, TIME_S = 5.0, 60.0, 1.0, 0.1

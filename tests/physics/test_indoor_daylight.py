@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from shotenv.config import BankConfig, CameraConfig, find_config, read_config
-from shotenv.world import draw_world
+from shotenv.config.bank import BankConfig, CameraConfig
+from shotenv.config.reader import find_config, read_config
+from shotenv.world.draw import draw_world
 
 CAMERA = CameraConfig(width=32, height=24, samples_per_pixel=64, gray_instants=4, bounces=2)
 
@@ -15,7 +16,7 @@ CAMERA = CameraConfig(width=32, height=24, samples_per_pixel=64, gray_instants=4
 @pytest.mark.render
 @pytest.mark.parametrize("family", ["garage", "tunnel"])
 def test_aiming_at_the_opening_keeps_the_mean(family):
-    from shotenv.render import render_frame
+    from shotenv.render.frame import render_frame
 
     config = read_config(BankConfig, find_config("bank", "starter"))
     worlds = (draw_world(family, seed, config.world) for seed in range(40))

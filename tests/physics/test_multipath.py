@@ -19,7 +19,7 @@ from render_worlds import (
     world,
 )
 
-from shotenv.render.llvm import start_mitsuba
+from shotenv.render.backend.llvm import start_mitsuba
 
 pytestmark = pytest.mark.render
 SPEED_OF_LIGHT_M_S = 299_792_458.0

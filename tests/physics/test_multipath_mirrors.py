@@ -24,8 +24,8 @@ from render_worlds import (
     world,
 )
 
-from shotenv.render.llvm import start_mitsuba
-from shotenv.world.model import Lamp, Light, Motion, MovingObject, Pose
+from shotenv.render.backend.llvm import start_mitsuba
+from shotenv.world.geometry.model import Lamp, Light, Motion, MovingObject, Pose
 
 pytestmark = pytest.mark.render
 SPEED_OF_LIGHT_M_S = 299_792_458.0

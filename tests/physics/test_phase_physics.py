@@ -5,7 +5,8 @@ import math
 import pytest
 import torch
 
-from unwrap.phase import SPEED_OF_LIGHT_M_S, TWO_PI, decode, distance_m
+from unwrap.signal.decoding import TWO_PI, decode, distance_m
+from unwrap.signal.frequencies import SPEED_OF_LIGHT_M_S
 
 SHAPE = (500, 800)
 SIGNAL_E, CONTRAST, AMBIENT_E, READ_E = 40_000.0, 0.85, 60_000.0, 83.0

@@ -19,15 +19,15 @@ from render_worlds import (
     world,
 )
 
-from shotenv.render import render_frame
-from shotenv.world.model import Motion, MovingObject, Pose
-from unwrap.acquisition import (
+from shotenv.render.frame import render_frame
+from shotenv.world.geometry.model import Motion, MovingObject, Pose
+from unwrap.signal.decoding import decode
+from unwrap.signal.shots import (
     demodulation_phase_rad,
     frequency_index,
     harmonic_weights,
     sample_times_s,
 )
-from unwrap.phase import decode
 
 pytestmark = pytest.mark.render
 SPEED_OF_LIGHT_M_S = 299_792_458.0

@@ -7,24 +7,21 @@ import math
 import pytest
 import torch
 
-from shotenv.config import SensorConfig, find_config, merged, read_config
-from shotenv.frames import Exposure
-from shotenv.problem import describe
-from shotenv.sensor import (
-    Purpose,
-    draw_noise,
-    draw_offsets,
-    electrons_per_radiance_second,
-    expose,
-    imager_temperature_k,
-    residual_drift_m,
-    stream,
-)
-from unwrap.acquisition import Shots, demodulation_phase_rad, frequency_index, harmonic_weights
-from unwrap.calibration import WiggleTable, wiggle_of
-from unwrap.correction import SensorDescription, correct
-from unwrap.frequencies import candidate_spacing_m, unambiguous_range_m
-from unwrap.phase import TWO_PI
+from shotenv.config.reader import find_config, merged, read_config
+from shotenv.config.sensor import SensorConfig
+from shotenv.sensor.acquisition import expose
+from shotenv.sensor.description import describe
+from shotenv.sensor.drift import imager_temperature_k, residual_drift_m
+from shotenv.sensor.electrons import electrons_per_radiance_second
+from shotenv.sensor.exposure import Exposure
+from shotenv.sensor.noise import Purpose, draw_noise, stream
+from shotenv.sensor.offsets import draw_offsets
+from unwrap.depth.correction import correct
+from unwrap.signal.decoding import TWO_PI
+from unwrap.signal.description import SensorDescription
+from unwrap.signal.frequencies import candidate_spacing_m, unambiguous_range_m
+from unwrap.signal.shots import Shots, demodulation_phase_rad, frequency_index, harmonic_weights
+from unwrap.signal.wiggle import WiggleTable, wiggle_of
 
 C_M_S = 299_792_458.0
 POWER_W, INTEGRATION_S, AMBIENT_K = 7.0, 6e-4, 306.15

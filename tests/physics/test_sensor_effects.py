@@ -7,22 +7,15 @@ import math
 import pytest
 import torch
 
-from shotenv.config import merged
-from shotenv.frames import Exposure
-from shotenv.sensor import (
-    OffsetPattern,
-    Purpose,
-    capture_gray,
-    distance_drift_m,
-    draw_noise,
-    draw_offsets,
-    electrons_per_radiance_second,
-    expose,
-    imager_temperature_k,
-    residual_drift_m,
-    stream,
-)
-from unwrap.acquisition import Shots, demodulation_phase_rad
+from shotenv.config.reader import merged
+from shotenv.sensor.acquisition import expose
+from shotenv.sensor.drift import distance_drift_m, imager_temperature_k, residual_drift_m
+from shotenv.sensor.electrons import electrons_per_radiance_second
+from shotenv.sensor.exposure import Exposure
+from shotenv.sensor.gray import capture_gray
+from shotenv.sensor.noise import Purpose, draw_noise, stream
+from shotenv.sensor.offsets import OffsetPattern, draw_offsets
+from unwrap.signal.shots import Shots, demodulation_phase_rad
 
 POWER_W, INTEGRATION_S = 7.0, 6e-4
 LIGHT_LEVELS = [10.0 ** (-3.0 + 0.25 * i) for i in range(10)]

@@ -7,11 +7,14 @@ import math
 import pytest
 import torch
 
-from shotenv.config import merged
-from shotenv.frames import Exposure
-from shotenv.sensor import OffsetPattern, draw_noise, electrons_per_radiance_second, expose
-from unwrap.acquisition import Shots, demodulation_phase_rad, frequency_index
-from unwrap.phase import decode, distance_m
+from shotenv.config.reader import merged
+from shotenv.sensor.acquisition import expose
+from shotenv.sensor.electrons import electrons_per_radiance_second
+from shotenv.sensor.exposure import Exposure
+from shotenv.sensor.noise import draw_noise
+from shotenv.sensor.offsets import OffsetPattern
+from unwrap.signal.decoding import decode, distance_m
+from unwrap.signal.shots import Shots, demodulation_phase_rad, frequency_index
 
 C_M_S = 299_792_458.0
 POWER_W, INTEGRATION_S = 7.0, 6e-4

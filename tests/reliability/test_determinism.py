@@ -14,10 +14,11 @@ import numpy as np
 import torch
 
 import shotenv
-from shotenv.frames import Exposure
-from shotenv.sensor import draw_noise, expose
-from unwrap.acquisition import Shots
-from unwrap.phase import decode
+from shotenv.sensor.acquisition import expose
+from shotenv.sensor.exposure import Exposure
+from shotenv.sensor.noise import draw_noise
+from unwrap.signal.decoding import decode
+from unwrap.signal.shots import Shots
 
 STEPS = 500
 PROGRAM = """

@@ -1,0 +1,11 @@
+from .policies import (
+    CyclePolicy as CyclePolicy,
+    FixedPolicy as FixedPolicy,
+    GuardedPolicy as GuardedPolicy,
+    Policy as Policy,
+    PpoPolicy as PpoPolicy,
+    RandomPolicy as RandomPolicy,
+    SnrThresholdPolicy as SnrThresholdPolicy,
+    load_policy as load_policy,
+)
+from .training import Sb3VecEnv as Sb3VecEnv

@@ -1,0 +1,16 @@
+"""TODO."""
+
+from __future__ import annotations
+
+from agents.config.agent import AgentConfig
+from agents.config.study import StudyConfig
+from shotenv.config import EnvConfig
+from unwrap.support import Section
+
+
+class DemoConfig(Section):
+    """The main job, small."""
+
+    env: EnvConfig
+    agent: AgentConfig
+    study: StudyConfig

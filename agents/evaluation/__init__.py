@@ -1,0 +1,5 @@
+"""Policies played on the same drives, compared in pairs; how much there is to win."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

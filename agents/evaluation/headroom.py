@@ -1,0 +1,184 @@
+"""How much there is to win in the decision problem: the clairvoyant optimum against simple rules.
+
+Cost is minus the return; excess is how much more than the optimum a policy costs over all drives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+
+from agents.config import StudyConfig
+from agents.evaluation.statistics import excess, interval, mean
+from agents.optimum import (
+    DriveTable,
+    Played,
+    Possible,
+    best_choice,
+    blind_choices,
+    clairvoyant,
+    describe_rule,
+    fixed,
+    greedy,
+    play,
+    threshold,
+    tuned_rule,
+)
+from shotenv.config import LaserConfig, RewardConfig
+
+SHOTS: Final = (2, 4, 8)
+GOALS: Final = {
+    "best_fixed": 0.15,
+    "best_blind": 0.12,
+    "threshold_rule": 0.05,
+    "greedy": 0.05,
+}
+LEAST_SHARE: Final = 0.10
+SWEEP: Final = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8)
+
+
+def check_solvable(laser: LaserConfig) -> None:
+    """Refuse a laser for which the optimum cannot be computed.
+
+    Raises
+    ------
+    ValueError
+        Derating makes what is measured depend on the laser's temperature.
+    """
+    if laser.derate_per_k:
+        raise ValueError(
+            f"derate_per_k of laser {laser.name} is {laser.derate_per_k:g}; expected 0: the "
+            "optimum does not know what a derated laser would measure"
+        )
+
+
+def measure_problem(
+    validation: Possible, test: Possible, weights: RewardConfig, study: StudyConfig
+) -> dict[str, Any]:
+    """The acceptance numbers of the decision problem on test drives, with intervals.
+
+    Parameters
+    ----------
+    validation, test : Possible
+        Drives that tune the rule, and drives that are judged.
+    weights : RewardConfig
+        Weights of the reward.
+    study : StudyConfig
+        Bootstrap draws and confidence.
+
+    Raises
+    ------
+    ValueError
+        The laser is derated.
+
+    Notes
+    -----
+    The best fixed and the best blind choice are picked on the test drives themselves, which
+    favours them; the rule is tuned on the validation drives.
+    """
+    check_solvable(test.problem.config.laser)
+    table = test.table(weights)
+    best = clairvoyant(table)
+    rivals = _rivals(validation.table(weights), table)
+    found: dict[str, dict[str, Any]] = {
+        name: {
+            "choice": choice,
+            **_interval(excess, study, played.cost, best.cost, name="excess"),
+            "goal": GOALS.get(name),
+        }
+        for name, (choice, played) in rivals.items()
+    }
+    shares = _shares(best, study)
+    return {
+        "drives": len(best.cost),
+        "optimum": {
+            "cost_per_drive": _interval(mean, study, best.cost, name="mean"),
+            "shots_share": shares,
+            "tripped_share": best.tripped_share,
+        },
+        "excess": found,
+        "holds": all(one["goal"] is None or one["excess"] >= one["goal"] for one in found.values())
+        and all(share["mean"] >= LEAST_SHARE for share in shares.values()),
+        "sweep": [_at_weight(test, weights, power) for power in SWEEP],
+    }
+
+
+def _rivals(validation: DriveTable, table: DriveTable) -> dict[str, tuple[str, Played]]:
+    """Each kind of policy at its best: what it chooses, and how it plays."""
+    blind = dict(blind_choices())
+    always = {f"always {shots}": fixed(action) for action, shots in enumerate(SHOTS)}
+    best_fixed, best_blind = best_choice(table, always.items()), best_choice(table, blind.items())
+    rule = tuned_rule(validation)
+    short_sighted = {
+        "least cost of the frame": greedy(table, guarded=False),
+        "least cost of the frame that does not trip": greedy(table, guarded=True),
+    }
+    return {
+        "best_fixed": (best_fixed, play(table, always[best_fixed])),
+        "best_blind": (best_blind, play(table, blind[best_blind])),
+        "threshold_rule": (describe_rule(rule), play(table, threshold(*rule))),
+        "greedy": min(short_sighted.items(), key=lambda item: item[1].cost.sum()),
+    }
+
+
+def _shares(best: Played, study: StudyConfig) -> dict[str, dict[str, float]]:
+    """Share of each action among the frames with laser, with its interval over drives."""
+    working = np.maximum((best.actions >= 0).sum(axis=1), 1)
+    return {
+        str(shots): _interval(
+            mean, study, (best.actions == action).sum(axis=1) / working, name="mean"
+        )
+        for action, shots in enumerate(SHOTS)
+    }
+
+
+def _interval(
+    statistic: Callable, study: StudyConfig, *samples: np.ndarray, name: str
+) -> dict[str, float]:
+    return interval(
+        statistic, *samples, draws=study.bootstrap_draws, confidence=study.confidence
+    ).named(name)
+
+
+def _at_weight(test: Possible, weights: RewardConfig, power: float) -> dict[str, Any]:
+    """What another weight of power makes of the problem."""
+    table = test.table(weights.model_copy(update={"power": power}))
+    best = clairvoyant(table)
+    costs = [play(table, fixed(action)).cost.sum() for action in range(3)]
+    cheapest = int(np.argmin(costs))
+    return {
+        "power": power,
+        "shots_share": best.shares.tolist(),
+        "best_fixed": f"always {SHOTS[cheapest]}",
+        "best_fixed_excess": float(costs[cheapest] / best.cost.sum() - 1.0),
+    }
+
+
+def print_problem(found: dict[str, Any], confidence: float) -> None:
+    """The numbers as text."""
+    optimum = found["optimum"]
+    print(f"Clairvoyant optimum over {found['drives']} test drives ({confidence:.0%} intervals)")
+    for shots, share in optimum["shots_share"].items():
+        print(
+            f"  {shots} DCS in {share['mean']:6.1%} of frames  "
+            f"({share['low']:.1%} to {share['high']:.1%}; goal at least {LEAST_SHARE:.0%})"
+        )
+    print(f"  laser off in {optimum['tripped_share']:.1%} of frames")
+    print("\nWhat others cost more than the optimum")
+    for name, one in found["excess"].items():
+        print(
+            f"  {name.replace('_', ' '):15}{one['excess']:6.1%}  "
+            f"({one['low']:.1%} to {one['high']:.1%}; goal at least {one['goal']:.0%})  "
+            f"{one['choice']}"
+        )
+    print(
+        "\nWeight of power   shares of 2 / 4 / 8 in the optimum   best fixed choice and its excess"
+    )
+    for row in found["sweep"]:
+        shares = " / ".join(f"{share:4.0%}" for share in row["shots_share"])
+        print(
+            f"  {row['power']:<16g}{shares:37}{row['best_fixed']}, {row['best_fixed_excess']:.1%}"
+        )
+    print(f"\nThe defaults {'hold' if found['holds'] else 'DO NOT hold'} every goal.")

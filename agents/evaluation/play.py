@@ -1,0 +1,126 @@
+"""Evaluation: every policy on the same drives with the same sensor noise, compared in pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from agents.config import StudyConfig
+from agents.policies import FixedPolicy, Policy
+
+if TYPE_CHECKING:
+    from gymnasium.vector import VectorEnv
+
+SHOTS: Final = (2, 4, 8)
+FIXED: Final = {f"always_{shots}": FixedPolicy(shots) for shots in SHOTS}
+MEASURES: Final = (
+    "return",
+    "laser_energy_j",
+    "energy_j",
+    "depth_mae_m",
+    "wrap_accuracy",
+    "tripped_share",
+)
+
+
+@dataclass(frozen=True)
+class Played:
+    """Drives as a policy drove them; N drives of T frames.
+
+    Attributes
+    ----------
+    seeds : int64 [N]
+        Seeds of the drives.
+    shots : int64 [N, T]
+        Samples taken; 0 where the laser was off.
+    reward, laser_energy_j, energy_j, depth_mae_m, wrap_accuracy, temperature_k : float64 [N, T]
+        As in the environment's `info`; error and wrap accuracy are NaN where the laser was off.
+    family : str [N, T]
+        Scene family of the frame.
+    """
+
+    seeds: np.ndarray
+    shots: np.ndarray
+    reward: np.ndarray
+    laser_energy_j: np.ndarray
+    energy_j: np.ndarray
+    depth_mae_m: np.ndarray
+    wrap_accuracy: np.ndarray
+    temperature_k: np.ndarray
+    family: np.ndarray
+
+    @property
+    def per_drive(self) -> dict[str, np.ndarray]:
+        """One number [N] per drive for each of `MEASURES`."""
+        return {
+            "return": self.reward.sum(axis=1),
+            "laser_energy_j": self.laser_energy_j.sum(axis=1),
+            "energy_j": self.energy_j.sum(axis=1),
+            "depth_mae_m": np.nanmean(self.depth_mae_m, axis=1),
+            "wrap_accuracy": np.nanmean(self.wrap_accuracy, axis=1),
+            "tripped_share": np.mean(self.shots == 0, axis=1),
+        }
+
+    def shots_share(self, family: str | None = None) -> list[float]:
+        """Share of 2, 4 and 8 shots among the frames with laser, of one family or of all."""
+        counted = self.shots if family is None else self.shots[self.family == family]
+        total = max(int(np.count_nonzero(counted)), 1)
+        return [float(np.count_nonzero(counted == shots) / total) for shots in SHOTS]
+
+
+def drive_seeds(study: StudyConfig, drives: int) -> list[int]:
+    """Seeds of the first `drives` drives of a study."""
+    return [study.seed + i for i in range(drives)]
+
+
+def play_drives(
+    policy: Policy,
+    envs: VectorEnv,
+    seeds: Sequence[int],
+    *,
+    tick: Callable[[int], object] = lambda frames: None,
+) -> Played:
+    """Drive one drive per environment, all at once, to the end.
+
+    Parameters
+    ----------
+    policy : Policy
+        Is reset first.
+    envs : gymnasium.vector.VectorEnv
+        As many environments as `seeds`, in any autoreset mode.
+    seeds : sequence of int
+        Seed of each drive.
+    tick : callable
+        Told the number of frames driven after each step.
+    """
+    one_each: Any = list(seeds)  # gymnasium's annotation forgets sequences
+    observations, infos = envs.reset(seed=one_each)
+    policy.reset()
+    frames: list[dict[str, np.ndarray]] = []
+    done = np.zeros(len(seeds), dtype=bool)
+    while not done.all():
+        actions = policy.act(observations, infos)
+        observations, rewards, terminated, truncated, infos = envs.step(actions)
+        done = terminated | truncated
+        frames.append(_frame(rewards, infos))
+        tick(len(seeds))
+    stacked = {name: np.stack([frame[name] for frame in frames], axis=1) for name in frames[0]}
+    return Played(seeds=np.asarray(seeds), **stacked)
+
+
+def _frame(rewards: np.ndarray, infos: Mapping[str, Any]) -> dict[str, Any]:
+    told = infos.get("final_info", infos)
+    off = np.asarray(told["shots"]) == 0
+    return {
+        "shots": np.array(told["shots"], dtype=np.int64),
+        "reward": np.array(rewards, dtype=np.float64),
+        "laser_energy_j": np.array(told["laser_energy_j"]),
+        "energy_j": np.array(told["energy_j"]),
+        "depth_mae_m": np.where(off, np.nan, told["depth_mae_m"]),
+        "wrap_accuracy": np.where(off, np.nan, told["wrap_accuracy"]),
+        "temperature_k": np.array(told["temperature_k"]),
+        "family": np.array(told["family"], dtype=np.str_),
+    }

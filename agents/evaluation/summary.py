@@ -1,0 +1,136 @@
+"""TODO."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from agents.config import StudyConfig
+from agents.evaluation.statistics import Interval, interval, mean, mean_difference
+
+if TYPE_CHECKING:
+    pass
+from agents.evaluation.play import FIXED, Played
+
+PACKAGES: Final = (
+    "shotenv",
+    "torch",
+    "stable-baselines3",
+    "gymnasium",
+    "mitsuba",
+    "numpy",
+    "scipy",
+)
+
+
+def best_fixed(played: Mapping[str, Played]) -> str:
+    """Name of the fixed choice with the highest mean return on these drives."""
+    return max(FIXED, key=lambda name: played[name].reward.sum())
+
+
+def best_rival(played: Mapping[str, Played], scheduler: str) -> str:
+    """Name of the policy with the highest mean return on these drives, but for the scheduler."""
+    others = [name for name in played if name != scheduler]
+    return max(others, key=lambda name: played[name].reward.sum())
+
+
+def summary(
+    played: Mapping[str, Played], study: StudyConfig, *, scheduler: str, **extra: Any
+) -> dict[str, Any]:
+    """The content of `results.json`.
+
+    Parameters
+    ----------
+    played : mapping of str to Played
+        The same drives under each policy, the fixed ones among them.
+    study : StudyConfig
+        Bootstrap draws and confidence.
+    scheduler : str
+        Name of the policy that was trained.
+    extra
+        Further keys.
+    """
+    fixed, rival = best_fixed(played), best_rival(played, scheduler)
+    families = sorted(set(played[fixed].family.ravel().tolist()))
+    return {
+        "policies": {name: _measured(one, study) for name, one in played.items()},
+        "paired_to_best_fixed": {
+            name: difference(one, played[fixed], study).named("difference")
+            for name, one in played.items()
+        },
+        "paired_to_best_rival": difference(played[scheduler], played[rival], study).named(
+            "difference"
+        ),
+        "drives": len(played[fixed].seeds),
+        "seeds": played[fixed].seeds.tolist(),
+        "versions": versions(),
+        "scheduler": scheduler,
+        "best_fixed": fixed,
+        "best_rival": rival,
+        "confidence": study.confidence,
+        "families": {
+            name: {family: one.shots_share(family) for family in families}
+            for name, one in played.items()
+        },
+        **extra,
+    }
+
+
+def _measured(played: Played, study: StudyConfig) -> dict[str, Any]:
+    intervals = {
+        name: _interval(mean, study, values).named("mean")
+        for name, values in played.per_drive.items()
+    }
+    return {**intervals, "shots_share": played.shots_share()}
+
+
+def difference(one: Played, other: Played, study: StudyConfig) -> Interval:
+    """Mean difference of the returns, drive by drive, one minus other."""
+    return _interval(mean_difference, study, one.per_drive["return"], other.per_drive["return"])
+
+
+def _interval(statistic: Callable, study: StudyConfig, *samples: np.ndarray) -> Interval:
+    return interval(statistic, *samples, draws=study.bootstrap_draws, confidence=study.confidence)
+
+
+def versions() -> dict[str, str]:
+    """Versions of the packages that the numbers depend on."""
+    return {name: version(name) for name in PACKAGES}
+
+
+def drive_rows(played: Mapping[str, Played]) -> list[dict[str, Any]]:
+    """One row per policy and drive: the content of `drives.csv`."""
+    return [
+        {
+            "policy": name,
+            "seed": int(one.seeds[i]),
+            **{measure: float(values[i]) for measure, values in one.per_drive.items()},
+        }
+        for name, one in played.items()
+        for i in range(len(one.seeds))
+    ]
+
+
+def timeline(
+    played: Mapping[str, Played], drive: int, frame_rate_hz: float, trip_k: float, release_k: float
+) -> dict[str, Any]:
+    """One drive, frame by frame, under each policy: the content of `timeline.json`."""
+    first = next(iter(played.values()))
+    return {
+        "drive": int(first.seeds[drive]),
+        "frame_rate_hz": frame_rate_hz,
+        "trip_k": trip_k,
+        "release_k": release_k,
+        "family": first.family[drive].tolist(),
+        "policies": {
+            name: {
+                "shots": one.shots[drive].tolist(),
+                "depth_mae_m": [None if np.isnan(x) else float(x) for x in one.depth_mae_m[drive]],
+                "temperature_k": one.temperature_k[drive].tolist(),
+            }
+            for name, one in played.items()
+        },
+    }

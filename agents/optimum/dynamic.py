@@ -1,0 +1,133 @@
+"""The clairvoyant optimum: what the best choice of shots costs when every outcome is known.
+
+Sensor noise depends on the drive's seed and the frame alone, so the cost and the heat of each
+action in each frame are fixed numbers, up to what a warm laser's efficiency adds to them; only
+the laser's temperature and its trip couple the frames. Dynamic programming over the discretised
+temperatures and the trip solves that exactly up to the grid, and the resulting choices are then
+played with the undiscretised thermal model.
+
+N drives, T frames, A = 3 actions throughout; temperatures in kelvin, heat in joules.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from agents.optimum.table import (
+    DriveTable,
+    Laser,
+    Played,
+    Situation,
+    play,
+)
+
+
+def clairvoyant(table: DriveTable, *, levels: int = 801, rise_levels: int = 25) -> Played:
+    """Optimum over all choices, by dynamic programming on a grid of temperatures.
+
+    `levels` temperatures of the case; with a junction stage a quarter of them, times `rise_levels`
+    rises of the junction.
+    """
+    grid = _grid(table, levels, rise_levels)
+    values = _values_to_go(table, grid)
+
+    def choose(now: Situation) -> np.ndarray:
+        """Action of least cost now plus least cost from then on."""
+        to_go = _look_up(values[now.frame + 1], _corners(grid, table.consequences(now.laser)))
+        return np.argmin(now.cost + to_go, axis=-1)
+
+    return play(table, choose)
+
+
+def greedy(table: DriveTable, *, guarded: bool) -> Played:
+    """Least cost of this frame alone; `guarded` avoids actions that trip the laser at once."""
+
+    def choose(now: Situation) -> np.ndarray:
+        trips = table.consequences(now.laser).tripped
+        barred = trips & ~trips.all(axis=-1, keepdims=True) & guarded
+        return np.argmin(np.where(barred, np.inf, now.cost), axis=-1)
+
+    return play(table, choose)
+
+
+class _Grid(NamedTuple):
+    """Evenly spaced temperatures of the case, and rises of the junction above it."""
+
+    case_k: np.ndarray
+    rise_k: np.ndarray
+
+    def everywhere(self, drives: int, *, tripped: bool) -> Laser:
+        """A laser at every point of the grid, [N, K]."""
+        case_k, rise_k = np.meshgrid(self.case_k, self.rise_k, indexing="ij")
+        shape = drives, case_k.size
+        return Laser(
+            np.broadcast_to(case_k.ravel(), shape),
+            np.broadcast_to(rise_k.ravel(), shape),
+            np.full(shape, tripped),
+        )
+
+
+def _grid(table: DriveTable, levels: int, rise_levels: int) -> _Grid:
+    if not table.highest_rise_k:
+        return _Grid(np.linspace(*table.span_k, levels), np.zeros(1))
+    rises_k = np.linspace(0.0, table.highest_rise_k, rise_levels)
+    return _Grid(np.linspace(*table.span_k, levels // 4), rises_k)
+
+
+def _values_to_go(table: DriveTable, grid: _Grid) -> np.ndarray:
+    """Least cost from each frame on, [T + 1, 2 (tripped), N, case levels, rise levels]."""
+    drives, frames, _ = table.cost.shape
+    shape = drives, grid.case_k.size, grid.rise_k.size
+    values = np.zeros((frames + 1, 2, *shape))
+    on, off = (grid.everywhere(drives, tripped=tripped) for tripped in (False, True))
+    warmed = _corners(grid, table.consequences(on))
+    cooled = _corners(grid, table.advance(off, np.zeros(off.case_k.shape)))
+    for frame in reversed(range(frames)):
+        cost, to_go = table.cost_at(frame, on.temperature_k), values[frame + 1]
+        working = np.min(cost + _look_up(to_go, warmed), axis=-1)
+        tripped = table.tripped_cost[:, frame, None] + _look_up(to_go, cooled)
+        values[frame] = working.reshape(shape), tripped.reshape(shape)
+    return values
+
+
+class _Corners(NamedTuple):
+    """Points of the grid around some lasers [N, ...]: where they are stored, and their weights.
+
+    Both are [2 or 4, N, ...].
+    """
+
+    stored: np.ndarray
+    weight: np.ndarray
+
+
+def _corners(grid: _Grid, laser: Laser) -> _Corners:
+    """The grid points that a value is interpolated from."""
+    case_k, rise_k, tripped = np.broadcast_arrays(*laser)
+    drive = np.arange(len(case_k)).reshape(-1, *[1] * (case_k.ndim - 1))
+    row = (tripped * len(case_k) + drive) * grid.case_k.size
+    stored, weight = zip(
+        *(
+            ((row + case) * grid.rise_k.size + rise, near * close)
+            for case, near in _ends(grid.case_k, case_k)
+            for rise, close in _ends(grid.rise_k, rise_k)
+        ),
+        strict=True,
+    )
+    return _Corners(np.stack(stored), np.stack(weight))
+
+
+def _look_up(values: np.ndarray, corners: _Corners) -> np.ndarray:
+    """Interpolate values [2, N, case levels, rise levels] of the grid."""
+    return (values.reshape(-1).take(corners.stored) * corners.weight).sum(axis=0)
+
+
+def _ends(axis: np.ndarray, value: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Grid levels around each value: their index and weight."""
+    if axis.size == 1:
+        return [(np.zeros(value.shape, np.int64), np.ones(value.shape))]
+    position = np.clip((value - axis[0]) / (axis[1] - axis[0]), 0.0, axis.size - 1.0)
+    below = np.minimum(position.astype(np.int64), axis.size - 2)
+    share = position - below
+    return [(below, 1.0 - share), (below + 1, share)]

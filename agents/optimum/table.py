@@ -1,0 +1,180 @@
+"""Everything that drives can turn out to be, and choices played on it.
+
+N drives, T frames, A = 3 actions throughout; temperatures in kelvin, heat in joules.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+Choice = Callable[["Situation"], np.ndarray]
+
+
+Name = TypeVar("Name")
+
+
+class Laser(NamedTuple):
+    """State of each drive's laser, [N, ...] for several states of each.
+
+    `case_k` is the temperature of the case, `rise_k` what the junction is above it.
+    """
+
+    case_k: np.ndarray
+    rise_k: np.ndarray
+    tripped: np.ndarray
+
+    @property
+    def temperature_k(self) -> np.ndarray:
+        """Of the junction."""
+        return self.case_k + self.rise_k
+
+
+Advance = Callable[[Laser, np.ndarray], Laser]
+
+
+class Rule(NamedTuple):
+    """Parameters of a one-threshold rule: actions below and above `limit`."""
+
+    limit: float
+    below: int
+    above: int
+
+
+@dataclass(frozen=True)
+class DriveTable:
+    """Everything that drives can turn out to be.
+
+    Attributes
+    ----------
+    cost : float64 [N, T, A]
+        Weighted cost (minus reward) of each action while the laser works, at 25 C.
+    laser_cost : float64 [N, A]
+        Part of it that pays for the laser's electrical energy.
+    surplus : callable
+        Share by which that energy is more at a junction temperature [N, ...] than at 25 C; any
+        shape that broadcasts.
+    tripped_cost : float64 [N, T]
+        Cost of a frame in which the laser is off because it tripped.
+    heat_j : float64 [N, A]
+        Heat that each action leaves in the laser, at 25 C.
+    start_k : float64 [N]
+        Laser temperature before the first frame.
+    snr : float64 [N, T, A]
+        The observed feature `signal_to_noise` after each action.
+    span_k : (low, high)
+        No case gets colder or hotter than this, whatever is chosen.
+    highest_rise_k : float
+        No junction gets hotter than this above its case; 0 without a junction stage.
+    advance : callable
+        The laser's thermal model over one frame: (laser, heat at 25 C) to the next laser; the two
+        broadcast. With `tripped`, the heat given is zero.
+    """
+
+    cost: np.ndarray
+    laser_cost: np.ndarray
+    surplus: Callable[[np.ndarray], np.ndarray]
+    tripped_cost: np.ndarray
+    heat_j: np.ndarray
+    start_k: np.ndarray
+    snr: np.ndarray
+    span_k: tuple[float, float]
+    highest_rise_k: float
+    advance: Advance
+
+    def cost_at(self, frame: int, temperature_k: np.ndarray) -> np.ndarray:
+        """Cost of each action at junction temperatures [N, ...]: [N, ..., A]."""
+        surplus = np.expand_dims(self.surplus(temperature_k), -1)
+        cost, laser_cost = (
+            beside(values, temperature_k) for values in (self.cost[:, frame], self.laser_cost)
+        )
+        return cost + laser_cost * surplus
+
+    def consequences(self, laser: Laser) -> Laser:
+        """The lasers [N, ...] one frame later, after each action: [N, ..., A]."""
+        heat_j = beside(self.heat_j, laser.case_k)
+        before = Laser(*(np.expand_dims(value, -1) for value in laser))
+        return self.advance(before, np.where(before.tripped, 0.0, heat_j))
+
+    def start(self) -> Laser:
+        """The lasers before the first frame."""
+        none = np.zeros(len(self.start_k))
+        return Laser(self.start_k.copy(), none, none.astype(bool))
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What a choice may depend on; a policy that is not clairvoyant looks at `snr` at most.
+
+    Attributes
+    ----------
+    frame : int
+        Number of the frame.
+    laser : Laser
+        Of each drive, [N].
+    snr : [N]
+        Feature `signal_to_noise` of the last acquisition, 0 before the first.
+    table : DriveTable
+        What each action would bring.
+    """
+
+    frame: int
+    laser: Laser
+    snr: np.ndarray
+    table: DriveTable
+
+    @property
+    def cost(self) -> np.ndarray:
+        """Cost of each action in this frame, [N, A]."""
+        return self.table.cost_at(self.frame, self.laser.temperature_k)
+
+
+@dataclass(frozen=True)
+class Played:
+    """Drives as they were played.
+
+    Attributes
+    ----------
+    actions : int64 [N, T]
+        Chosen actions, -1 in frames in which the laser was off.
+    cost : float64 [N]
+        Summed cost of each drive.
+    """
+
+    actions: np.ndarray
+    cost: np.ndarray
+
+    @property
+    def shares(self) -> np.ndarray:
+        """Share of each action among the frames with laser, [A]."""
+        chosen = self.actions[self.actions >= 0]
+        return np.bincount(chosen, minlength=3) / max(chosen.size, 1)
+
+    @property
+    def tripped_share(self) -> float:
+        """Share of frames in which the laser was off."""
+        return float(np.mean(self.actions < 0))
+
+
+def play(table: DriveTable, choose: Choice) -> Played:
+    """Play every drive of `table`, asking `choose` for the actions [N] of each frame."""
+    drives, frames, _ = table.cost.shape
+    laser, snr, cost = table.start(), np.zeros(drives), np.zeros(drives)
+    rows, actions = np.arange(drives), np.empty((drives, frames), np.int64)
+    for frame in range(frames):
+        now = Situation(frame, laser, snr, table)
+        chosen = choose(now)
+        actions[:, frame] = np.where(laser.tripped, -1, chosen)
+        cost += np.where(laser.tripped, table.tripped_cost[:, frame], now.cost[rows, chosen])
+        snr = np.where(laser.tripped, snr, table.snr[rows, frame, chosen])
+        heat_j = np.where(laser.tripped, 0.0, table.heat_j[rows, chosen])
+        laser = table.advance(laser, heat_j)
+    return Played(actions, cost)
+
+
+def beside(values: np.ndarray, states: np.ndarray) -> np.ndarray:
+    """Values [N, A] of each drive for states [N, ...] of it: [N, ..., A], broadcast."""
+    return values.reshape(len(values), *[1] * (states.ndim - 1), -1)

@@ -1,0 +1,142 @@
+"""From the environment's problem to the table of everything that its drives can turn out to be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from gymnasium.utils import seeding
+from torch import Tensor
+
+from agents.optimum.table import Advance, DriveTable, Laser
+from agents.policies import SNR_FEATURE
+from shotenv.config import LaserConfig, RewardConfig
+from shotenv.decision import (
+    SEEN_FEATURES,
+    Drive,
+    Outcomes,
+    Problem,
+    draw_drive,
+    outcomes_of_all_actions,
+    reward,
+)
+from shotenv.env import drive_seed
+from shotenv.laser import case_step, efficiency_at, junction_step, trip_step
+
+SNR_COLUMN = [feature.name for feature in SEEN_FEATURES].index(SNR_FEATURE)
+
+
+@dataclass(frozen=True)
+class Possible:
+    """Drives and everything that could happen in them, before the reward weighs it.
+
+    Attributes
+    ----------
+    problem : Problem
+    drives : tuple of Drive
+        Batches of one.
+    outcomes : tuple of Outcomes
+        Of each drive.
+    """
+
+    problem: Problem
+    drives: tuple[Drive, ...]
+    outcomes: tuple[Outcomes, ...]
+
+    def table(self, weights: RewardConfig) -> DriveTable:
+        """The table that choices are played on, with these reward weights.
+
+        Nothing derates the laser in it.
+        """
+        period_s, laser = self.problem.frame_period_s, self.problem.config.laser
+        ambient_k = np.array([float(drive.ambient_k) for drive in self.drives])
+        heat_j = self._stacked(lambda one: one.heat_j[0])
+        cost = self._stacked(lambda one: -reward(one.terms, weights))
+        off = self._stacked(lambda one: -reward(one.tripped_terms, weights))
+        return DriveTable(
+            cost=cost,
+            laser_cost=self._laser_cost(heat_j, weights),
+            surplus=lambda temperature_k: energy_surplus(temperature_k, laser),
+            tripped_cost=np.broadcast_to(off.reshape(-1, 1), cost.shape[:2]),
+            heat_j=heat_j,
+            snr=self._stacked(lambda one: one.features[..., SNR_COLUMN]),
+            start_k=np.array([float(drive.start_k) for drive in self.drives]),
+            span_k=_span_k(ambient_k, heat_j, laser, period_s),
+            highest_rise_k=laser.junction_resistance_k_per_w * _hottest_j(heat_j, laser) / period_s,
+            advance=thermal_model(ambient_k, laser, period_s),
+        )
+
+    def _laser_cost(self, heat_j: np.ndarray, weights: RewardConfig) -> np.ndarray:
+        """What the laser's own energy at 25 C costs with each action, [N, A]."""
+        laser_j = heat_j / (1.0 - self.problem.config.laser.efficiency)
+        whole_j = np.array([float(drive.always_eight.energy_j) for drive in self.drives])
+        return weights.power * laser_j / whole_j[:, None]
+
+    def _stacked(self, of: Callable[[Outcomes], Tensor]) -> np.ndarray:
+        return np.stack([of(one).numpy().astype(np.float64) for one in self.outcomes])
+
+
+def tabulate(
+    problem: Problem, seeds: Sequence[int], *, tick: Callable[[int], object] = lambda frames: None
+) -> Possible:
+    """Play every action in every frame of the drives that environments have with these seeds.
+
+    `tick` is told the number of frames after each drive.
+    """
+    drives, outcomes = [], []
+    for seed in seeds:
+        drives.append(drive_of(problem, seed))
+        outcomes.append(outcomes_of_all_actions(problem, drives[-1]))
+        tick(problem.config.frames_per_drive)
+    return Possible(problem, tuple(drives), tuple(outcomes))
+
+
+def drive_of(problem: Problem, seed: int) -> Drive:
+    """The first drive of an environment after `reset(seed=seed)`."""
+    generator, _ = seeding.np_random(seed)
+    bank, config = problem.bank, problem.config
+    return draw_drive(drive_seed(generator), config, problem.clips, bank.height, bank.width)
+
+
+def energy_surplus(temperature_k: np.ndarray, laser: LaserConfig) -> np.ndarray:
+    """Share by which light takes more electrical energy at a temperature than at 25 C."""
+    if not laser.efficiency_slope_per_k:
+        return np.zeros(1)
+    return laser.efficiency / efficiency_at(temperature_k, laser) - 1.0
+
+
+def thermal_model(ambient_k: np.ndarray, laser: LaserConfig, period_s: float) -> Advance:
+    """The laser's heat and trip over one frame, for drives with these ambient temperatures [N]."""
+
+    def advance(now: Laser, heat_j: np.ndarray) -> Laser:
+        around_k = ambient_k.reshape(-1, *[1] * (now.case_k.ndim - 1))
+        heat_j = _heat_at(now.temperature_k, heat_j, laser)
+        case_k = case_step(now.case_k, heat_j, around_k, laser, period_s)
+        rise_k = now.rise_k
+        if laser.junction_resistance_k_per_w:
+            rise_k = junction_step(rise_k, heat_j, laser, period_s)
+        return Laser(case_k, rise_k, trip_step(now.tripped, case_k + rise_k, laser))
+
+    return advance
+
+
+def _heat_at(temperature_k: np.ndarray, heat_j: np.ndarray, laser: LaserConfig) -> np.ndarray:
+    """Heat at a temperature, of actions that leave `heat_j` at 25 C: what light does not take."""
+    if not laser.efficiency_slope_per_k:
+        return heat_j
+    return heat_j * (1.0 + energy_surplus(temperature_k, laser) / (1.0 - laser.efficiency))
+
+
+def _hottest_j(heat_j: np.ndarray, laser: LaserConfig) -> float:
+    """Most heat of any frame of any drive."""
+    return float(_heat_at(np.array(laser.trip_k), heat_j.max(), laser))
+
+
+def _span_k(
+    ambient_k: np.ndarray, heat_j: np.ndarray, laser: LaserConfig, period_s: float
+) -> tuple[float, float]:
+    """Coldest ambient, and what the hottest frame makes of a laser about to trip."""
+    hottest_j = _hottest_j(heat_j, laser)
+    hottest = case_step(laser.trip_k, hottest_j, ambient_k, laser, period_s)
+    return float(ambient_k.min()), max(float(hottest.max()), laser.trip_k)

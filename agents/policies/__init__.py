@@ -1,0 +1,5 @@
+"""Policies: what chooses the shots of a frame from the observation."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

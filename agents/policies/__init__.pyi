@@ -1,0 +1,18 @@
+from .base import Action as Action, Observation as Observation, Policy as Policy
+from .fixed import (
+    CyclePolicy as CyclePolicy,
+    FixedPolicy as FixedPolicy,
+    RandomPolicy as RandomPolicy,
+)
+from .guard import (
+    GuardedPolicy as GuardedPolicy,
+    ThermalGuard as ThermalGuard,
+    largest_rises_k as largest_rises_k,
+)
+from .learned import (
+    PpoPolicy as PpoPolicy,
+    first_line as first_line,
+    load_policy as load_policy,
+    network_arguments as network_arguments,
+)
+from .rules import SNR_FEATURE as SNR_FEATURE, SnrThresholdPolicy as SnrThresholdPolicy

@@ -1,0 +1,61 @@
+"""Policies: what chooses the shots of a frame from the observation.
+
+Every policy answers for one environment (observation [D], an int) and for a batch of them
+(observation [N, D], int64 [N]) alike, and starts anew at `reset`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from unwrap.signal import Shots
+
+if TYPE_CHECKING:
+    pass
+
+Action = Any
+Observation = Any
+
+
+class Policy(ABC):
+    """Chooses an action, 0 = 2 DCS, 1 = 4 DCS, 2 = 8 DCS, from what is observed."""
+
+    @abstractmethod
+    def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
+        """Action of one environment, or int64 [N] of a batch of N."""
+
+    def reset(self) -> None:  # noqa: B027 - most policies remember nothing
+        """Forget everything: the next `act` is the first of new drives."""
+
+
+def checked_shots(shots: int) -> Shots:
+    """`shots` as `Shots`.
+
+    Raises
+    ------
+    ValueError
+        It is not 2, 4 or 8.
+    """
+    if shots not in tuple(Shots):
+        raise ValueError(f"shots is {shots!r}; expected 2, 4 or 8")
+    return Shots(shots)
+
+
+def batch_shape(observation: Observation) -> tuple[int, ...]:
+    """() for the observation of one environment, (N,) for a batch of N."""
+    features = observation["state"] if isinstance(observation, Mapping) else observation
+    return np.shape(features)[:-1]
+
+
+def like(observation: Observation, action: int) -> Action:
+    """`action` for one environment or for each of a batch, as `observation` has it."""
+    return single(np.full(batch_shape(observation), action, dtype=np.int64))
+
+
+def single(actions: np.ndarray | np.integer) -> Action:
+    """A Python int where there is no batch."""
+    return int(actions) if np.ndim(actions) == 0 else np.asarray(actions)

@@ -1,0 +1,224 @@
+"""Charts of the report, as plotly figures."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from agents.report.results import label
+
+SHOTS = (2, 4, 8)
+SHOT_COLORS = ("#9ecae1", "#4292c6", "#08407f")
+ACCENT, MUTED, INK = "#c2410c", "#64748b", "#1e293b"
+FAMILY_COLORS = {
+    "sunny_road": "#fde68a",
+    "overcast_street": "#d6dde6",
+    "garage": "#e7d3c0",
+    "tunnel": "#cfd3dd",
+    "night_road": "#b7bfdc",
+}
+FONT = {"family": "Inter, system-ui, 'Segoe UI', Roboto, sans-serif", "size": 13, "color": INK}
+CONFIG = {"displaylogo": False, "responsive": True, "displayModeBar": False}
+
+
+def figure_html(figure: go.Figure) -> str:
+    """The chart as a piece of HTML; plotly itself is inlined once by the page."""
+    return figure.to_html(full_html=False, include_plotlyjs=False, config=CONFIG)
+
+
+def error_against_energy(results: dict[str, Any]) -> go.Figure:
+    """Depth error against laser energy, one marker with two intervals per policy."""
+    figure = go.Figure()
+    by_energy = sorted(
+        results["policies"].items(), key=lambda item: item[1]["laser_energy_j"]["mean"]
+    )
+    top_m = max(policy["depth_mae_m"]["high"] for _, policy in by_energy)
+    # Each label in a row of its own, left of its line: no line crosses another policy's label.
+    row_m = top_m / 16
+    for place, (name, policy) in enumerate(by_energy):
+        energy, error = policy["laser_energy_j"], policy["depth_mae_m"]
+        chosen = name == results["scheduler"]
+        color = ACCENT if chosen else MUTED
+        figure.add_scatter(
+            x=[energy["mean"]],
+            y=[error["mean"]],
+            error_x=_whiskers(energy, color),
+            error_y=_whiskers(error, color),
+            mode="markers",
+            marker={"size": 13 if chosen else 10, "color": color, "symbol": _symbol(name)},
+            name=label(name),
+            hovertemplate="%{x:.1f} J<br>%{y:.3f} m<extra>" + label(name) + "</extra>",
+        )
+        figure.add_annotation(
+            x=energy["mean"],
+            y=error["mean"],
+            text=f"<b>{label(name)}</b>" if chosen else label(name),
+            font={"color": color, "size": 12},
+            arrowcolor=color,
+            arrowwidth=0.8,
+            arrowhead=0,
+            standoff=7,
+            ax=0,
+            ayref="y",
+            ay=top_m + row_m * (1 + place),
+            xanchor="right",
+        )
+    figure.update_xaxes(title="laser energy per drive, J", rangemode="tozero", **AXIS)
+    span_m = [0, top_m + row_m * (len(by_energy) + 1)]
+    figure.update_yaxes(title="mean absolute depth error, m", range=span_m, **AXIS)
+    return _styled(figure, height=430, showlegend=False)
+
+
+def shares_by_family(results: dict[str, Any], names: tuple[str, ...]) -> go.Figure:
+    """Stacked bars of each action's share in each scene family, one panel per policy."""
+    figure = make_subplots(
+        rows=1, cols=len(names), shared_yaxes=True, subplot_titles=[label(name) for name in names]
+    )
+    for column, name in enumerate(names, start=1):
+        shares = {"all frames": results["policies"][name]["shots_share"]}
+        shares |= results["families"][name]
+        families = [_family(family) for family in reversed(shares)]
+        table = np.array(list(reversed(shares.values())))
+        for action, shots in enumerate(SHOTS):
+            figure.add_bar(
+                x=table[:, action],
+                y=families,
+                orientation="h",
+                name=f"{shots} DCS",
+                legendgroup=str(shots),
+                showlegend=column == 1,
+                marker={"color": SHOT_COLORS[action], "line": {"color": "white", "width": 1}},
+                text=[f"{share:.0%}" if share >= 0.08 else "" for share in table[:, action]],
+                textposition="inside",
+                insidetextanchor="middle",
+                textangle=0,
+                insidetextfont={"color": INK if action == 0 else "white", "size": 12},
+                hovertemplate="%{y}: %{x:.1%}<extra>" + f"{shots} DCS</extra>",
+                row=1,
+                col=column,
+            )
+    figure.update_xaxes(range=[0, 1], tickformat=".0%", showgrid=False, zeroline=False)
+    figure.update_layout(barmode="stack", bargap=0.28, legend=LEGEND | {"traceorder": "normal"})
+    return _styled(figure, height=360, left=120, top=60)
+
+
+def timeline(record: dict[str, Any], scheduler: str, fixed: str) -> go.Figure:
+    """Shots, error and laser temperature of one drive, scheduler against best fixed choice."""
+    figure = make_subplots(
+        rows=3,
+        cols=1,
+        shared_xaxes=True,
+        vertical_spacing=0.045,
+        row_heights=[0.24, 0.38, 0.38],
+    )
+    seconds = np.arange(len(record["family"])) / record["frame_rate_hz"]
+    for name, color, width in ((fixed, MUTED, 1.3), (scheduler, ACCENT, 1.9)):
+        played = record["policies"][name]
+        style = {"line": {"color": color, "width": width}, "legendgroup": name, "mode": "lines"}
+        shots = {"x": seconds, "y": [_level(value) for value in played["shots"]]}
+        figure.add_scatter(
+            **shots, **_step(style), name=label(name), showlegend=False, row=1, col=1
+        )
+        figure.add_scatter(
+            x=seconds, y=played["depth_mae_m"], **style, name=label(name), row=2, col=1
+        )
+        temperature = np.array(played["temperature_k"]) - 273.15
+        figure.add_scatter(
+            x=seconds, y=temperature, **style, name=label(name), showlegend=False, row=3, col=1
+        )
+    _limit(figure, record["trip_k"], "laser trips")
+    _limit(figure, record["release_k"], "laser comes back")
+    _family_bands(figure, record["family"], record["frame_rate_hz"])
+    figure.update_yaxes(
+        title="shots", tickvals=[0, 1, 2, 3], ticktext=["off", "2", "4", "8"], row=1, **AXIS
+    )
+    figure.update_yaxes(range=[-0.35, 3.35], row=1)
+    figure.update_yaxes(title="depth error, m", rangemode="tozero", row=2, **AXIS)
+    figure.update_yaxes(title="laser, °C", row=3, **AXIS)
+    figure.update_xaxes(showgrid=False, zeroline=False)
+    figure.update_xaxes(title="time in the drive, s", row=3)
+    figure.update_layout(hovermode="x", legend=LEGEND | {"y": 1.07})
+    return _styled(figure, height=650, top=80)
+
+
+AXIS = {"gridcolor": "#e2e8f0", "zeroline": False}
+LEGEND = {"orientation": "h", "x": 1.0, "xanchor": "right", "y": 1.12, "yanchor": "bottom"}
+
+
+def _styled(
+    figure: go.Figure, *, height: int, left: int = 70, top: int = 20, **layout: Any
+) -> go.Figure:
+    return figure.update_layout(
+        template="none",
+        font=FONT,
+        height=height,
+        margin={"l": left, "r": 30, "t": top, "b": 55},
+        paper_bgcolor="rgba(0,0,0,0)",
+        plot_bgcolor="rgba(0,0,0,0)",
+        **layout,
+    )
+
+
+def _whiskers(interval: dict[str, float], color: str) -> dict[str, Any]:
+    return {
+        "type": "data",
+        "symmetric": False,
+        "array": [interval["high"] - interval["mean"]],
+        "arrayminus": [interval["mean"] - interval["low"]],
+        "thickness": 1.2,
+        "width": 4,
+        "color": color,
+    }
+
+
+def _symbol(name: str) -> str:
+    return {"ppo": "star", "snr_threshold": "diamond", "random": "x", "cycle": "square"}.get(
+        name, "circle"
+    )
+
+
+def _family(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _level(shots: int) -> int:
+    """Height in the time line: off, 2, 4, 8."""
+    return (0, *SHOTS).index(shots)
+
+
+def _step(style: dict[str, Any]) -> dict[str, Any]:
+    return {**style, "line": {**style["line"], "shape": "hv"}}
+
+
+def _limit(figure: go.Figure, temperature_k: float, text: str) -> None:
+    figure.add_hline(
+        y=temperature_k - 273.15,
+        line={"color": INK, "width": 1, "dash": "dot"},
+        annotation={"text": text, "font": {"size": 11, "color": MUTED}},
+        annotation_position="top left",
+        row=3,
+        col=1,
+    )
+
+
+def _family_bands(figure: go.Figure, families: list[str], frame_rate_hz: float) -> None:
+    """Shade each clip in its family's colour, its name above where there is room."""
+    edges = [i for i in range(len(families)) if i == 0 or families[i] != families[i - 1]]
+    for start, end in zip(edges, [*edges[1:], len(families)], strict=True):
+        band = {"x0": start / frame_rate_hz, "x1": end / frame_rate_hz}
+        color = FAMILY_COLORS.get(families[start], "#e2e8f0")
+        shape = {"fillcolor": color, "opacity": 0.38, "line_width": 0, "layer": "below"}
+        figure.add_vrect(**band, **shape)
+        if end - start >= len(families) / 20:
+            figure.add_annotation(
+                x=(band["x0"] + band["x1"]) / 2,
+                y=1.0,
+                yref="paper",
+                yanchor="bottom",
+                text=_family(families[start]).replace(" ", "<br>"),
+                font={"size": 10, "color": MUTED},
+                showarrow=False,
+            )

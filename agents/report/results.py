@@ -1,0 +1,172 @@
+"""Results of an evaluation as they lie on disk beside the report.
+
+results.json    means and intervals of every policy, paired differences, seeds, versions
+drives.csv      one row per policy and drive
+timeline.json   one drive, frame by frame, of the scheduler and of the best fixed choice
+frames.npz      images of some of its frames: gray, wrapped map, corrected depth, truth
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from unwrap.support import write_bytes, write_json, write_text
+
+RESULTS, DRIVES, TIMELINE, FRAMES = "results.json", "drives.csv", "timeline.json", "frames.npz"
+LABELS = {
+    "ppo": "PPO scheduler",
+    "snr_threshold": "SNR threshold rule",
+    "cycle": "Cycle",
+    "random": "Random",
+    "always_2": "Always 2 DCS",
+    "always_4": "Always 4 DCS",
+    "always_8": "Always 8 DCS",
+    "always_8_guarded": "Always 8 DCS, guarded",
+}
+
+
+@dataclass(frozen=True)
+class Strip:
+    """Frames to look at. F frames of H x W pixels.
+
+    Attributes
+    ----------
+    gray_lsb : uint16 [F, H, W]
+        Passive gray image, 12 bits.
+    wrapped_m, corrected_m, truth_m : float32 [F, H, W]
+        Wrapped distance at f1, depth after unwrapping, true distance; metres, NaN where there
+        is none.
+    valid : bool [F, H, W]
+        Where the sensor calls its depth valid.
+    shots, frame : int64 [F]
+        Samples taken (0: the laser was off) and the frame's number in its drive.
+    depth_mae_m : float64 [F]
+        Mean absolute depth error, NaN where there is none.
+    family, drive : str [F], int64 [F]
+        Scene family and seed of the drive.
+    unambiguous_m, max_range_m : float
+        Unambiguous range at f1 and largest scored range, metres.
+    """
+
+    gray_lsb: np.ndarray
+    wrapped_m: np.ndarray
+    corrected_m: np.ndarray
+    truth_m: np.ndarray
+    valid: np.ndarray
+    shots: np.ndarray
+    frame: np.ndarray
+    depth_mae_m: np.ndarray
+    family: np.ndarray
+    drive: np.ndarray
+    unambiguous_m: np.ndarray
+    max_range_m: np.ndarray
+
+
+def label(name: str) -> str:
+    """A policy's name as it is shown."""
+    return LABELS.get(name, name.replace("_", " "))
+
+
+def verdict(results: dict[str, Any]) -> str:
+    """Whether the scheduler beats the best fixed choice, in one sentence that hides nothing."""
+    scheduler, fixed = results["scheduler"], results["best_fixed"]
+    pair = results["paired_to_best_fixed"][scheduler]
+    interval = f"{results['confidence']:.0%} interval {pair['low']:+.1f} to {pair['high']:+.1f}"
+    against = f"the best fixed choice, {_in_a_sentence(fixed)}"
+    drives = f"over {results['drives']} test drives"
+    if pair["low"] <= 0.0 <= pair["high"]:
+        return (
+            f"No significant difference: the trained scheduler's return is "
+            f"{pair['difference']:+.1f} from that of {against}, {drives}, and the {interval} "
+            "includes zero."
+        )
+    beats = "beats" if pair["difference"] > 0 else "does worse than"
+    return (
+        f"The trained scheduler {beats} {against}, by {abs(pair['difference']):.1f} in return "
+        f"({interval}) {drives}, with {_energy_change(results, scheduler, fixed)}."
+    )
+
+
+def rival_note(results: dict[str, Any]) -> str:
+    """How the scheduler does against the strongest other policy, in one sentence."""
+    pair, rival = results["paired_to_best_rival"], _in_a_sentence(results["best_rival"])
+    interval = f"{results['confidence']:.0%} interval {pair['low']:+.1f} to {pair['high']:+.1f}"
+    known = "" if pair["low"] * pair["high"] > 0.0 else ", which includes zero"
+    return (
+        f"Against the strongest of the other policies, {rival}, its return is "
+        f"{pair['difference']:+.1f} ({interval}{known})."
+    )
+
+
+def _in_a_sentence(name: str) -> str:
+    return label(name).lower().replace("dcs", "DCS").replace("snr", "SNR")
+
+
+def _energy_change(results: dict[str, Any], scheduler: str, fixed: str) -> str:
+    used = [results["policies"][name]["laser_energy_j"]["mean"] for name in (scheduler, fixed)]
+    change = used[0] / used[1] - 1.0
+    return f"{abs(change):.0%} {'less' if change < 0 else 'more'} laser energy"
+
+
+def write_drives(path: Path, rows: Sequence[dict[str, Any]]) -> None:
+    """One line per policy and drive, as CSV."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_text(path, text.getvalue())
+
+
+def write_strip(path: Path, strip: Strip) -> None:
+    """Images and their labels as a compressed numpy archive."""
+    content = io.BytesIO()
+    np.savez_compressed(content, **vars(strip))
+    write_bytes(path, content.getvalue())
+
+
+def read_strip(path: Path) -> Strip:
+    """Strip written by `write_strip`.
+
+    Raises
+    ------
+    ValueError
+        The file is missing or damaged.
+    """
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            return Strip(**{name: archive[name] for name in archive.files})
+    except Exception as error:  # zipfile, zlib, numpy and missing keys each raise their own
+        raise ValueError(f"{path} is missing or damaged ({error}); {CURE}") from None
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """A table that an evaluation wrote.
+
+    Raises
+    ------
+    ValueError
+        The file is missing or damaged.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{path} is missing or damaged ({error}); {CURE}") from None
+    if not isinstance(content, dict):
+        raise ValueError(f"{path} is damaged (not a table); {CURE}")
+    return content
+
+
+CURE = "`shotenv evaluate` writes it"
+
+
+def write_results(path: Path, results: dict[str, Any]) -> None:
+    """Means and intervals of every policy."""
+    write_json(path, results)

@@ -1,0 +1,232 @@
+"""PPO training of a scheduler: interruptible, resumable, without pickle.
+
+Training runs in rounds of whole drives. A round starts every environment on one of the training
+drives, chosen with a random state that derives from the run's seed and the round's number alone;
+so what a round does is a function of the network, the optimiser and that number, and a resumed
+run equals an uninterrupted one.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.utils import set_random_seed
+from tqdm import tqdm
+
+from agents.config import AgentConfig
+from agents.policies import PpoPolicy, ThermalGuard, first_line, network_arguments
+from agents.training.sb3_vector import Sb3VecEnv
+from unwrap.support import progress, write_bytes
+
+CHECKPOINT: Final = "checkpoint.safetensors"
+SCHEMA: Final = "1"
+Validate = Callable[[PpoPolicy], float]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run has come: finished rounds, best validation return and its round."""
+
+    rounds: int = 0
+    best_return: float = -math.inf
+    best_round: int = -1
+
+
+class Trainer:
+    """One PPO run in the folder `out`.
+
+    Parameters
+    ----------
+    envs : Sb3VecEnv
+        `config.num_envs` environments.
+    guard : ThermalGuard
+        Stands between network and laser.
+    frames_per_drive : int
+        Length of an episode; a round lasts at least that long.
+    config : AgentConfig
+        Hyper-parameters.
+    validate : callable
+        Mean return of a policy on validation drives; the best round's policy is kept.
+    out : Path
+        Gets the checkpoint, and the best policy as `policy.safetensors` and `agent.json`.
+    warm : callable, optional
+        Trains the actor before the first round, see `agents.training.warmup`.
+
+    Raises
+    ------
+    ValueError
+        `out` holds the checkpoint of another configuration, or a damaged one.
+    """
+
+    def __init__(
+        self,
+        envs: Sb3VecEnv,
+        guard: ThermalGuard,
+        frames_per_drive: int,
+        config: AgentConfig,
+        validate: Validate,
+        out: Path,
+        warm: Callable[[ActorCriticPolicy], None] | None = None,
+    ) -> None:
+        self._envs, self._config, self._validate, self._out = envs, config, validate, out
+        self._warm = warm
+        self._ppo = build_ppo(envs, config)
+        self.policy = PpoPolicy(self._ppo.policy, config, guard)
+        self._drives = training_drives(config)
+        self._few = config.drives < config.num_envs
+        updates = math.ceil(frames_per_drive / config.rollout_steps)
+        self._round_steps = updates * config.rollout_steps * config.num_envs
+        self._rounds = math.ceil(config.total_steps / self._round_steps)
+        self._identity = json.dumps(
+            {
+                "agent": config.model_dump(mode="json"),
+                "features": list(guard.feature_names),
+                "guard_needed_k": list(guard.needed_k),
+            }
+        )
+
+    def run(self) -> PpoPolicy:
+        """Train to the end, from the checkpoint where there is one; returns the best policy.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            Ctrl-C; the checkpoint of the last finished round is kept.
+        """
+        self._out.mkdir(parents=True, exist_ok=True)
+        state = self._load()
+        if state == Progress() and self._warm is not None:
+            self._warm(self._ppo.policy)
+            state = self._judged(state)
+            self._save(state)
+        done = state.rounds * self._round_steps
+        with progress(self._rounds * self._round_steps, "training", "step", done=done) as bar:
+            while state.rounds < self._rounds:
+                self._train_round(state.rounds, bar)
+                state = replace(self._judged(state), rounds=state.rounds + 1)
+                bar.set_postfix_str(f"validation return {state.best_return:.1f}", refresh=False)
+                self._save(state)
+        return PpoPolicy.load(self._out)
+
+    def _train_round(self, number: int, bar: tqdm) -> None:
+        generator = np.random.default_rng((self._config.seed, number))
+        set_random_seed(int(generator.integers(2**31)))
+        drives = generator.choice(self._drives, self._config.num_envs, replace=self._few)
+        self._envs.seed_all(drives.tolist())
+        self._ppo._last_obs = None  # makes `learn` reset the environments
+        self._ppo.num_timesteps = number * self._round_steps
+        self._anneal(number)
+        self._ppo.learn(self._round_steps, callback=_Ticks(bar), reset_num_timesteps=False)
+
+    def _anneal(self, number: int) -> None:
+        """The learning rate falls linearly, round by round, to a tenth."""
+        rate = self._config.learning_rate * (1.0 - 0.9 * number / self._rounds)
+        self._ppo.lr_schedule = lambda _: rate
+
+    def _judged(self, state: Progress) -> Progress:
+        """`state` with the return of the policy as it is, which is kept where it is the best."""
+        found = self._validate(self.policy)
+        if found <= state.best_return:
+            return state
+        self.policy.save(self._out)
+        return replace(state, best_return=found, best_round=state.rounds)
+
+    def _save(self, state: Progress) -> None:
+        words = {"schema": SCHEMA, "identity": self._identity, "progress": json.dumps(vars(state))}
+        write_bytes(self._out / CHECKPOINT, save(_tensors(self._ppo), words))
+
+    def _load(self) -> Progress:
+        path = self._out / CHECKPOINT
+        if not path.exists():
+            return Progress()
+        try:
+            with safe_open(path, framework="pt") as file:
+                words = dict(file.metadata() or {})
+                tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+            same = (words["schema"], words["identity"]) == (SCHEMA, self._identity)
+            if same:
+                _restore(self._ppo, tensors)
+            state = Progress(**json.loads(words["progress"]))
+        except (SafetensorError, OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
+            raise ValueError(
+                f"{path} is damaged ({first_line(error)}); delete it to start anew"
+            ) from None
+        if not same:
+            raise ValueError(
+                f"{path} belongs to another configuration; choose another folder or delete it"
+            )
+        return state
+
+
+def training_drives(config: AgentConfig) -> np.ndarray:
+    """Seeds of the drives that a scheduler is trained on."""
+    return np.random.SeedSequence(config.seed).generate_state(config.drives)
+
+
+def build_ppo(envs: Sb3VecEnv, config: AgentConfig) -> PPO:
+    """An untrained PPO as `config` says."""
+    return PPO(
+        "MlpPolicy",
+        envs,
+        learning_rate=config.learning_rate,
+        n_steps=config.rollout_steps,
+        batch_size=config.batch_size,
+        n_epochs=config.epochs,
+        gamma=config.gamma,
+        gae_lambda=config.gae_lambda,
+        ent_coef=config.entropy_coefficient,
+        policy_kwargs=network_arguments(config),
+        seed=config.seed,
+        device="cpu",
+    )
+
+
+class _Ticks(BaseCallback):
+    """Moves the progress bar."""
+
+    def __init__(self, bar: tqdm) -> None:
+        super().__init__()
+        self._bar = bar
+
+    def _on_step(self) -> bool:
+        self._bar.update(self.training_env.num_envs)
+        return True
+
+
+def _tensors(ppo: PPO) -> dict[str, torch.Tensor]:
+    """Network and optimiser as named tensors."""
+    network = {f"network.{name}": value for name, value in ppo.policy.state_dict().items()}
+    adam = {
+        f"optimizer.{parameter}.{name}": torch.as_tensor(value)
+        for parameter, slots in ppo.policy.optimizer.state_dict()["state"].items()
+        for name, value in slots.items()
+    }
+    return {name: value.detach().clone().contiguous() for name, value in (network | adam).items()}
+
+
+def _restore(ppo: PPO, tensors: dict[str, torch.Tensor]) -> None:
+    """Inverse of `_tensors`."""
+    network: dict[str, torch.Tensor] = {}
+    slots: dict[int, dict[str, Any]] = {}
+    for name, value in tensors.items():
+        kind, rest = name.split(".", 1)
+        if kind == "network":
+            network[rest] = value
+        else:
+            parameter, slot = rest.split(".", 1)
+            slots.setdefault(int(parameter), {})[slot] = value
+    ppo.policy.load_state_dict(network)
+    optimizer = ppo.policy.optimizer
+    optimizer.load_state_dict({**optimizer.state_dict(), "state": slots})

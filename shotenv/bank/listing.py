@@ -1,0 +1,115 @@
+"""What is in a bank, and which banks there are: as numbers, and printed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from shotenv.bank.build import bank_bytes, bank_folder, clips_standing, rendering_minutes
+from shotenv.bank.reader import Bank
+from shotenv.bank.store import MANIFEST, frame_bytes
+from shotenv.config import BankConfig, configs_dir, read_config
+
+
+def known_banks() -> list[dict[str, Any]]:
+    """Each bank in `configs/bank/`: its size, and how much of it stands in the cache folder."""
+    paths = sorted((configs_dir() / "bank").glob("*.yaml"))
+    return [_planned(read_config(BankConfig, path)) for path in paths]
+
+
+def _planned(config: BankConfig) -> dict[str, Any]:
+    standing, clips = clips_standing(config)
+    frames = clips * config.world.frames_per_clip
+    missing = (clips - standing) * config.world.frames_per_clip
+    folder = bank_folder(config)
+    return {
+        "name": config.name,
+        "frames": frames,
+        "width": config.camera.width,
+        "height": config.camera.height,
+        "bytes": bank_bytes(config, frames),
+        "clips": clips,
+        "clips_standing": standing,
+        "rendered": standing == clips and (folder / MANIFEST).is_file(),
+        "minutes_left": rendering_minutes(config, missing) if missing else 0.0,
+        "folder": str(folder),
+    }
+
+
+def print_banks(banks: list[dict[str, Any]]) -> None:
+    """A line for each of the `known_banks`."""
+    print(f"{'bank':12}{'frames':>7}  {'pixels':>10}{'size':>9}   state")
+    for bank in banks:
+        print(
+            f"{bank['name']:12}{bank['frames']:>7}  {_pixels(bank):>10}"
+            f"{_gigabytes(bank['bytes']):>9}   {_state(bank)}"
+        )
+
+
+def _state(bank: dict[str, Any]) -> str:
+    if bank["rendered"]:
+        return bank["folder"]
+    begun = f"{bank['clips_standing']} of {bank['clips']} clips stand"
+    state = begun if bank["clips_standing"] else "not rendered"
+    return f"{state}, about {bank['minutes_left']:.0f} minutes to render"
+
+
+def describe_bank(bank: Bank) -> dict[str, Any]:
+    """Size, frames of each family in each split, and the configuration of `bank`."""
+    splits: dict[str, dict[str, int]] = {}
+    for clip in bank.clips:
+        families = splits.setdefault(clip.split, {})
+        families[clip.family] = families.get(clip.family, 0) + clip.frames
+    return {
+        "name": bank.manifest.name,
+        "folder": str(bank.folder),
+        "fingerprint": bank.fingerprint,
+        "frames": len(bank),
+        "clips": len(bank.clips),
+        "width": bank.width,
+        "height": bank.height,
+        "bytes": len(bank) * frame_bytes(bank.height, bank.width),
+        "splits": splits,
+        "config": None if bank.config is None else bank.config.model_dump(mode="json"),
+    }
+
+
+def print_bank(about: dict[str, Any]) -> None:
+    """What `describe_bank` found."""
+    print(
+        f"{about['name']}: {about['frames']} frames of {_pixels(about)} pixels in "
+        f"{about['clips']} clips, {_gigabytes(about['bytes'])}"
+    )
+    print(f"  folder       {about['folder']}\n  fingerprint  {about['fingerprint']}")
+    print(f"  rendered     {_settings(about['config'])}\n")
+    _print_counts(about["splits"])
+
+
+def _settings(config: dict[str, Any] | None) -> str:
+    if config is None:
+        return "no, imported"
+    camera, world, sensor = config["camera"], config["world"], config["sensor"]
+    return (
+        f"{camera['samples_per_pixel']} rays per pixel and instant, {camera['bounces']} bounces, "
+        f"{camera['horizontal_fov_deg']:g} degrees; {world['frames_per_clip']} frames per clip at "
+        f"{world['frame_rate_hz']:g} Hz; {sensor['name']}, {sensor['f1_hz'] / 1e6:g} and "
+        f"{sensor['f2_hz'] / 1e6:g} MHz; seeds from {config['seed']}"
+    )
+
+
+def _print_counts(splits: dict[str, dict[str, int]]) -> None:
+    """Frames: a row for each family, a column for each split."""
+    families = list(dict.fromkeys(family for counts in splits.values() for family in counts))
+    print(f"  {'frames':20}" + "".join(f"{split:>12}" for split in splits))
+    for family in families:
+        counts = [split.get(family, 0) for split in splits.values()]
+        print(f"  {family:20}" + "".join(f"{count or '-':>12}" for count in counts))
+    sums = [sum(counts.values()) for counts in splits.values()]
+    print(f"  {'all':20}" + "".join(f"{total:>12}" for total in sums))
+
+
+def _pixels(bank: dict[str, Any]) -> str:
+    return f"{bank['width']} x {bank['height']}"
+
+
+def _gigabytes(size: int) -> str:
+    return f"{size / 1e9:.2f} GB" if size >= 1e8 else f"{size / 1e6:.1f} MB"

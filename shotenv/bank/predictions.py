@@ -1,0 +1,119 @@
+"""Network predictions for the frames of a bank: computed once, kept in the cache folder.
+
+    <cache>/predictions/<bank>-<network>/distance_m.npy, confidence.npy, kept.json
+
+Where the network is shown every k-th row and column (`unwrap.networks.sizes`) -k follows its name.
+The folder is written under a hidden name, flushed and renamed; `kept.json` holds each file's
+sha256. Kept predictions that are damaged are computed again.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import uuid
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from shotenv.bank.build import cache_dir
+from shotenv.bank.reader import Bank
+from shotenv.bank.store import sha256_of
+from unwrap.networks import Prediction, Unwrapper
+from unwrap.support import progress, write_json
+
+ARRAYS = ("distance_m", "confidence")
+SUMMARY = "kept.json"
+
+
+@dataclass(frozen=True)
+class KeptPredictions:
+    """Predictions of every frame of a bank, memory-mapped float16 [N, H, W]."""
+
+    distance_m: Tensor
+    confidence: Tensor
+
+    def of(self, frames: Tensor) -> Prediction:
+        """Prediction, float32, of the bank frames `frames` [B]."""
+        return Prediction(_rows(self.distance_m, frames), _rows(self.confidence, frames))
+
+    def distance_of(self, frames: Tensor) -> Tensor:
+        """Predicted distance float32 [B, H, W] of the bank frames `frames` [B]."""
+        return _rows(self.distance_m, frames)
+
+
+def _rows(maps: Tensor, frames: Tensor) -> Tensor:
+    rows = [maps.narrow(0, frame, 1) for frame in frames.tolist()]
+    return (rows[0] if len(rows) == 1 else torch.cat(rows)).to(torch.float32)
+
+
+def keep_predictions(bank: Bank, unwrapper: Unwrapper) -> KeptPredictions:
+    """Predictions of `unwrapper` for `bank`, from the cache folder or computed now."""
+    name = f"{bank.fingerprint}-{unwrapper.fingerprint[:16]}"
+    stride = unwrapper.stride(bank.height, bank.width)
+    if stride > 1:
+        name += f"-{stride}"
+    folder = cache_dir() / "predictions" / name
+    kept = _load(folder, bank)
+    if kept is None:
+        _compute(folder, bank, unwrapper)
+        kept = _load(folder, bank)
+    if kept is None:
+        raise OSError(f"cannot keep predictions in {folder}; is its disk full or failing?")
+    return kept
+
+
+def _load(folder: Path, bank: Bank) -> KeptPredictions | None:
+    """Kept predictions, or None where there are none or they are damaged."""
+    try:
+        hashes = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+        if any(sha256_of(folder / f"{name}.npy") != hashes[name] for name in ARRAYS):
+            return None
+        maps = [np.load(folder / f"{n}.npy", mmap_mode="c", allow_pickle=False) for n in ARRAYS]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    shape = (len(bank), bank.height, bank.width)
+    if any(found.shape != shape or found.dtype != np.float16 for found in maps):
+        return None
+    return KeptPredictions(*(torch.from_numpy(found) for found in maps))
+
+
+def _compute(folder: Path, bank: Bank, unwrapper: Unwrapper) -> None:
+    temporary = folder.with_name(f".{folder.name}.{uuid.uuid4().hex[:8]}")
+    temporary.mkdir(parents=True)
+    try:
+        maps = _predict_all(bank, unwrapper)
+        for name, values in zip(ARRAYS, maps, strict=True):
+            _write(temporary / f"{name}.npy", values)
+        write_json(
+            temporary / SUMMARY, {name: sha256_of(temporary / f"{name}.npy") for name in ARRAYS}
+        )
+        # Another process may have been faster; what stands then is as good unless damaged.
+        if _load(folder, bank) is None:
+            shutil.rmtree(folder, ignore_errors=True)
+            temporary.rename(folder)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _predict_all(bank: Bank, unwrapper: Unwrapper) -> tuple[np.ndarray, np.ndarray]:
+    shape = (len(bank), bank.height, bank.width)
+    distance_m, confidence = np.empty(shape, np.float16), np.empty(shape, np.float16)
+    with progress(len(bank), f"{unwrapper.name} predicts", "frame") as bar:
+        for index in range(len(bank)):
+            prediction = unwrapper.predict(bank.gray(torch.tensor([index])))
+            distance_m[index] = prediction.distance_m[0].numpy()
+            confidence[index] = prediction.confidence[0].numpy()
+            bar.update()
+    return distance_m, confidence
+
+
+def _write(path: Path, values: np.ndarray) -> None:
+    with path.open("wb") as file:
+        np.save(file, values, allow_pickle=False)
+        file.flush()
+        os.fsync(file.fileno())

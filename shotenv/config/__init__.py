@@ -1,0 +1,5 @@
+"""Typed configuration: one frozen model per folder of `configs/`, and the YAML reader."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

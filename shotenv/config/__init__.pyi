@@ -1,0 +1,13 @@
+from .bank import BankConfig as BankConfig, CameraConfig as CameraConfig, WorldConfig as WorldConfig
+from .env import EnvConfig as EnvConfig, RewardConfig as RewardConfig
+from .families import Family as Family, Split as Split
+from .keywords import env_config as env_config
+from .laser import ROOM_K as ROOM_K, LaserConfig as LaserConfig
+from .reader import (
+    ConfigError as ConfigError,
+    configs_dir as configs_dir,
+    find_config as find_config,
+    one_sentence as one_sentence,
+    read_config as read_config,
+)
+from .sensor import SensorConfig as SensorConfig

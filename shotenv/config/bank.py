@@ -1,0 +1,76 @@
+"""TODO."""
+
+from __future__ import annotations
+
+from pydantic import Field, model_validator
+
+from shotenv.config.families import FAMILIES, SHIFT_FAMILIES, Family, Split
+from shotenv.config.sensor import SensorConfig
+from unwrap.support import Positive, Range, Section, check_range
+
+
+class CameraConfig(Section):
+    """Image geometry and the instants that are rendered."""
+
+    width: int = Field(160, ge=16, le=1280, description="pixels across")
+    height: int = Field(120, ge=16, le=960, description="pixels down")
+    horizontal_fov_deg: float = Field(60.0, gt=5, lt=150, description="horizontal field of view")
+    samples_per_pixel: int = Field(4, ge=1, description="camera rays per pixel and instant")
+    gray_instants: int = Field(4, ge=1, le=16, description="instants that make the gray image")
+    bounces: int = Field(2, ge=1, le=8, description="surface hits of a light path")
+
+
+class WorldConfig(Section):
+    """Which worlds are drawn and how a clip moves through them."""
+
+    families: tuple[Family, ...] = Field(FAMILIES, min_length=1, description="scene families")
+    speed_m_s: Range = Field((0.0, 15.0), description="ego speed, m/s")
+    frame_rate_hz: Positive = Field(10.0, description="frames per second of a clip")
+    frames_per_clip: int = Field(16, ge=1, le=4096, description="frames of one clip")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> WorldConfig:
+        check_range("speed_m_s", self.speed_m_s)
+        return self
+
+
+class BankConfig(Section):
+    """A bank of rendered clips: which worlds, how many of each family per split."""
+
+    name: str = Field(
+        pattern=r"^[A-Za-z0-9_-]{1,80}$", description="name of the bank and of its folder"
+    )
+    sensor: SensorConfig
+    camera: CameraConfig = CameraConfig()
+    world: WorldConfig = WorldConfig()
+    seed: int = Field(0, ge=0, description="first world seed; clip i has seed + i")
+    train_clips: int = Field(8, ge=0, description="training clips of each family")
+    validation_clips: int = Field(3, ge=0, description="validation clips of each family")
+    test_clips: int = Field(3, ge=0, description="test clips of each family")
+    shift_clips: int = Field(0, ge=0, description="clips of each held-out family")
+
+    @property
+    def clips(self) -> dict[Split, tuple[int, tuple[Family, ...]]]:
+        """Split to the number of clips of each of its families, and those families."""
+        seen = self.world.families
+        return {
+            "train": (self.train_clips, seen),
+            "validation": (self.validation_clips, seen),
+            "test": (self.test_clips, seen),
+            "shift": (self.shift_clips, SHIFT_FAMILIES),
+        }
+
+    @model_validator(mode="after")
+    def _consistent(self) -> BankConfig:
+        if not any(count for count, _ in self.clips.values()):
+            raise ValueError(
+                "train_clips, validation_clips, test_clips and shift_clips are all 0; expected "
+                "at least one clip"
+            )
+        held_out = sorted(set(self.world.families) & set(SHIFT_FAMILIES))
+        if self.shift_clips and held_out:
+            raise ValueError(
+                f"world.families has {', '.join(held_out)}, which shift_clips = "
+                f"{self.shift_clips} holds out; expected other families, or shift_clips = 0"
+            )
+        return self

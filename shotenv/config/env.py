@@ -1,0 +1,55 @@
+"""TODO."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from shotenv.config.families import Split
+from shotenv.config.laser import LaserConfig
+from shotenv.config.sensor import SensorConfig
+from unwrap.support import NonNegative, Positive, Section
+
+
+class RewardConfig(Section):
+    """Weights of the bounded reward terms: r = -(sum of weight times term)."""
+
+    error: NonNegative = Field(1.0, description="weight of the depth error term")
+    duty: NonNegative = Field(0.005, description="weight of laser duty relative to always-8")
+    power: NonNegative = Field(0.005, description="weight of power relative to always-8")
+    trip: NonNegative = Field(0.5, description="weight of a frame without laser")
+    error_scale_m: Positive = Field(
+        4.0, description="error at which a pixel's term |e| / (|e| + scale) is one half, m"
+    )
+
+
+class EnvConfig(Section):
+    """The decision problem."""
+
+    sensor: SensorConfig
+    laser: LaserConfig
+    bank: str = Field("starter", description="name or path of a bank")
+    split: Literal[Split, "all"] = Field(
+        "train", description="clips that drives are made of; all: those of no held-out family"
+    )
+    unwrapper: str = Field("tofregnet", description="name or path of an unwrapping network")
+    merge: Literal["nearest", "floor", "none"] = Field(
+        "nearest",
+        description="how prediction and wrapped map merge: ours, eq. 6, or the prediction alone",
+    )
+    observation: Literal["features"] = Field("features", description="what is observed")
+    frames_per_drive: int = Field(256, ge=2, description="frames of one episode")
+    frame_rate_hz: Positive = Field(10.0, description="frames per second")
+    reward: RewardConfig = RewardConfig()
+
+    @model_validator(mode="after")
+    def _fits_the_frame(self) -> EnvConfig:
+        frame_s = 1.0 / self.frame_rate_hz
+        acquisition_s = 8 * self.sensor.sample_period_s
+        if acquisition_s > frame_s:
+            raise ValueError(
+                f"frame_rate_hz is {self.frame_rate_hz:g}: eight samples take {acquisition_s:g} s, "
+                f"more than the frame period of {frame_s:g} s"
+            )
+        return self

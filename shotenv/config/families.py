@@ -1,0 +1,32 @@
+"""TODO."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+Split = Literal["train", "validation", "test", "shift"]
+
+
+Family = Literal[
+    "sunny_road",
+    "overcast_street",
+    "garage",
+    "tunnel",
+    "night_road",
+    "warehouse",
+    "construction_site",
+    "forest_path",
+    "snowy_street",
+]
+
+
+FAMILIES: tuple[Family, ...] = ("sunny_road", "overcast_street", "garage", "tunnel", "night_road")
+
+
+SHIFT_FAMILIES: tuple[Family, ...] = (
+    "warehouse",
+    "construction_site",
+    "forest_path",
+    "snowy_street",
+)
+"""Held out: other geometry, materials and light, and kinds of things that FAMILIES never show."""

@@ -1,0 +1,115 @@
+"""Configuration of the imager."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from unwrap.signal import harmonic_weights, joint_range_m, unambiguous_range_m
+from unwrap.support import Fraction, NonNegative, Positive, Range, Section, check_range
+
+Share = Annotated[float, Field(gt=0.0, le=1.0)]
+Frequency = Annotated[float, Field(ge=1e5, le=1e9)]
+Kelvin = Annotated[float, Field(ge=200.0, le=450.0)]
+
+
+class SensorConfig(Section):
+    """The imager: optics, pixel, converter, timing. Every source is named in the YAML file."""
+
+    name: str = Field(description="name of the imager")
+    f1_hz: Frequency = Field(24e6, description="first modulation frequency, Hz")
+    f2_hz: Frequency = Field(10e6, description="second modulation frequency, Hz")
+    sample_period_s: Positive = Field(
+        3.85e-3, le=1.0, description="time from one DCS to the next, s"
+    )
+    integration_s: Range = Field(
+        (5.5e-4, 7.5e-4), description="integration time drawn per drive, s"
+    )
+    harmonic_strength: Fraction = Field(
+        0.0, description="overtones of light and demodulation: 0 = sines, 1 = ideal squares"
+    )
+    highest_harmonic: int = Field(7, ge=1, le=31, description="highest odd harmonic rendered")
+    wiggle_calibrated_share: Fraction = Field(
+        0.95, description="share of the wiggle, the overtones' phase error, that its table removes"
+    )
+    distance_drift_m_per_k: NonNegative = Field(
+        0.0, le=1.0, description="distance added per kelvin above the calibration temperature, m/K"
+    )
+    drift_compensated_share: Fraction = Field(
+        0.95, description="share of the distance drift removed by the measured temperature"
+    )
+    calibration_temperature_k: Kelvin = Field(
+        298.15, description="imager temperature at which offset and distance were calibrated, K"
+    )
+    self_heating_k: NonNegative = Field(
+        0.0, le=100.0, description="imager temperature above ambient, K"
+    )
+    wavelength_nm: float = Field(940.0, ge=300.0, le=2000.0, description="laser wavelength, nm")
+    f_number: float = Field(1.2, ge=0.5, le=32.0, description="lens f-number")
+    lens_transmission: Share = Field(0.8, description="lens and filter transmission")
+    pixel_pitch_m: float = Field(20e-6, ge=1e-6, le=1e-3, description="pixel pitch, m")
+    fill_factor: Share = Field(1.0, description="light-sensitive share of a pixel")
+    quantum_efficiency: Share = Field(0.28, description="electrons per photon in band")
+    contrast: Share = Field(0.85, description="demodulation contrast m")
+    read_noise_e: NonNegative = Field(83.0, description="read noise of one tap, electrons rms")
+    full_well_e: Positive = Field(160e3, description="full well of one tap, electrons")
+    gain_lsb_per_e: Positive = Field(0.0128, description="converter gain, LSB per electron")
+    adc_bits: int = Field(12, ge=8, le=16, description="bits of the converter")
+    offset_std_lsb: NonNegative = Field(17.6, description="std of the tap offset pattern, LSB")
+    offset_row_share: Fraction = Field(0.5, description="share of offset variance common to a row")
+    offset_calibrated_share: Fraction = Field(
+        0.95, description="share of the pattern removed by the stored dark-offset map"
+    )
+    offset_ambient_lsb: NonNegative = Field(
+        8.0, description="row-parity offset that ambient adds at a full tap, LSB"
+    )
+    offset_drift_lsb_per_k: NonNegative = Field(
+        0.0, description="std of the offset pattern's change per kelvin, LSB/K"
+    )
+    gray_max_exposure_s: Positive = Field(5e-3, description="longest gray exposure, s")
+    gray_target: Share = Field(0.3, description="mean of full scale aimed at by gray exposure")
+    min_snr: NonNegative = Field(1.0, description="signal-to-noise below which depth is invalid")
+    saturation_range_m: Positive = Field(
+        6.2, description="d_sat of eq. 6 and 8: wrapped distances from here on are not trusted, m"
+    )
+    max_range_m: Positive = Field(25.0, description="range that is unwrapped and scored, m")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> SensorConfig:
+        check_range("integration_s", self.integration_s)
+        if self.f2_hz >= self.f1_hz:
+            raise ValueError(f"f2_hz is {self.f2_hz:g}; expected less than f1_hz = {self.f1_hz:g}")
+        if self.highest_harmonic % 2 == 0:
+            raise ValueError(f"highest_harmonic is {self.highest_harmonic}; expected an odd number")
+        if self.integration_s[0] <= 0 or self.integration_s[1] >= self.sample_period_s:
+            raise ValueError(
+                f"integration_s is {self.integration_s}; expected 0 < t < sample_period_s = "
+                f"{self.sample_period_s:g} s"
+            )
+        self._check_overtones()
+        self._check_ranges()
+        return self
+
+    def _check_overtones(self) -> None:
+        weights = harmonic_weights(self.harmonic_strength, self.highest_harmonic)
+        demodulated = self.contrast * sum(weight for _, weight in weights)
+        if demodulated > 1.0:
+            raise ValueError(
+                f"contrast is {self.contrast:g} and harmonic_strength {self.harmonic_strength:g}: "
+                f"{demodulated:.3f} of the signal would be demodulated; expected at most 1"
+            )
+
+    def _check_ranges(self) -> None:
+        wrap_m = unambiguous_range_m(self.f1_hz)
+        if self.saturation_range_m > wrap_m:
+            raise ValueError(
+                f"saturation_range_m is {self.saturation_range_m:g}; expected at most the "
+                f"unambiguous range {wrap_m:.4g} m of f1_hz = {self.f1_hz:g}"
+            )
+        joint_m = joint_range_m(self.f1_hz, self.f2_hz)
+        if self.max_range_m > joint_m:
+            raise ValueError(
+                f"max_range_m is {self.max_range_m:g}; expected at most the joint range "
+                f"{joint_m:.4g} m of f1_hz = {self.f1_hz:g} and f2_hz = {self.f2_hz:g}"
+            )

@@ -1,0 +1,5 @@
+"""Frames of a bank as networks are trained and judged on them."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

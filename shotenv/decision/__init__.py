@@ -1,0 +1,5 @@
+"""The decision problem: drives, acquisition, score, reward, features, and the transition."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

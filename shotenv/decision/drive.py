@@ -1,0 +1,143 @@
+"""A drive: clips strung together, and the sensor that goes along."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from shotenv.bank import Clip
+from shotenv.config import EnvConfig
+from shotenv.laser import ShotCost, shot_cost
+from shotenv.sensor import (
+    OffsetPattern,
+    Purpose,
+    Sensitivity,
+    draw_offsets,
+    imager_temperature_k,
+    residual_drift_m,
+    sensitivity,
+    stream,
+)
+from unwrap.signal import Shots
+from unwrap.support import Range
+
+FAMILY_STAYS = 0.5
+"""Probability that the next clip is of the same family."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A batch of drives: everything about an episode that no action changes.
+
+    Attributes
+    ----------
+    seed : int64 [B]
+        Seed of the drive; its noise, its layout and its sensor follow from it.
+    frames : int64 [B, T + 1]
+        Bank frame of each step, and the one that is seen after the last.
+    laser_power_w, integration_s, ambient_k : float64 [B]
+        Optical power while on, time of one sample, ambient temperature.
+    start_k : float64 [B]
+        Laser temperature before the first frame.
+    sensitivity : Sensitivity
+        Electrons per light with this power and time.
+    offsets : OffsetPattern
+        Fixed pattern of the imager, [B, H, W].
+    drift_m : float64 [B]
+        What the imager's temperature adds to every distance, compensation included, metres.
+    always_eight : ShotCost
+        Most that a frame of eight samples costs with this laser and integration time: at its full
+        power, about to trip.
+    """
+
+    seed: Tensor
+    frames: Tensor
+    laser_power_w: Tensor
+    integration_s: Tensor
+    ambient_k: Tensor
+    start_k: Tensor
+    sensitivity: Sensitivity
+    offsets: OffsetPattern
+    drift_m: Tensor
+    always_eight: ShotCost
+
+    def frame(self, step: Tensor) -> Tensor:
+        """Bank frames int64 [B] at `step` [B]."""
+        return self.frames.gather(1, step.unsqueeze(1)).squeeze(1)
+
+
+def draw_drive(
+    seed: int, config: EnvConfig, clips: Sequence[Clip], height: int, width: int
+) -> Drive:
+    """The drive of `seed`, a batch of one.
+
+    Laser power and integration time are drawn log-uniformly, the ambient temperature uniformly,
+    and the laser starts between ambient and the temperature at which it would be released.
+    """
+    layout, body = stream(Purpose.DRIVE, seed, 0), stream(Purpose.DRIVE, seed, 1)
+    frames = draw_frames(clips, config.frames_per_drive + 1, generator=layout)
+    unit = torch.rand(4, dtype=torch.float64, generator=body)
+    laser_power_w = _log_uniform(config.laser.optical_power_w, unit[0:1])
+    integration_s = _log_uniform(config.sensor.integration_s, unit[1:2])
+    ambient_k = _uniform(config.laser.ambient_k, unit[2:3])
+    imager_k = imager_temperature_k(config.sensor, ambient_k)
+    offsets = draw_offsets(
+        config.sensor,
+        height,
+        width,
+        generator=stream(Purpose.OFFSETS, seed),
+        imager_k=float(imager_k),
+    )
+    return Drive(
+        seed=torch.tensor([seed]),
+        frames=frames.unsqueeze(0),
+        laser_power_w=laser_power_w,
+        integration_s=integration_s,
+        ambient_k=ambient_k,
+        start_k=ambient_k + unit[3:4] * (config.laser.release_k - ambient_k),
+        sensitivity=sensitivity(config.sensor, laser_power_w, integration_s),
+        offsets=offsets,
+        drift_m=residual_drift_m(config.sensor, imager_k),
+        always_eight=shot_cost(
+            torch.tensor([int(Shots.EIGHT)]),
+            config.laser,
+            optical_power_w=laser_power_w,
+            temperature_k=torch.full_like(laser_power_w, config.laser.trip_k),
+            integration_s=integration_s,
+            frame_period_s=1.0 / config.frame_rate_hz,
+            network_macs=0,
+        ),
+    )
+
+
+def draw_frames(clips: Sequence[Clip], length: int, *, generator: torch.Generator) -> Tensor:
+    """Bank frames int64 [length] of randomly chosen clips, each played from start to end.
+
+    The next clip is of the same family with probability `FAMILY_STAYS`, else of any; no clip
+    follows itself where there is a choice.
+    """
+    frames: list[int] = []
+    last: Clip | None = None
+    while len(frames) < length:
+        last = _next_clip(clips, last, generator)
+        frames.extend(range(last.start, last.start + last.frames))
+    return torch.tensor(frames[:length])
+
+
+def _next_clip(clips: Sequence[Clip], last: Clip | None, generator: torch.Generator) -> Clip:
+    stays, choice = torch.rand(2, dtype=torch.float64, generator=generator).tolist()
+    others = [clip for clip in clips if clip is not last] or list(clips)
+    kin = [clip for clip in others if last is not None and clip.family == last.family]
+    pool = kin if kin and stays < FAMILY_STAYS else others
+    return pool[int(choice * len(pool))]
+
+
+def _uniform(bounds: Range, unit: Tensor) -> Tensor:
+    return bounds[0] + unit * (bounds[1] - bounds[0])
+
+
+def _log_uniform(bounds: Range, unit: Tensor) -> Tensor:
+    return bounds[0] * (bounds[1] / bounds[0]) ** unit

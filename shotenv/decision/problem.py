@@ -1,0 +1,113 @@
+"""What never changes while drives are played: bank, predictions, configuration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import torch
+from torch import Tensor
+
+from shotenv.bank import Bank, Clip, KeptPredictions, check_fits, keep_predictions, open_bank
+from shotenv.config import EnvConfig
+from shotenv.decision.scenes import Scenes, look_at_scenes
+from shotenv.sensor import describe
+from unwrap.networks import Unwrapper, load_unwrapper
+from unwrap.signal import SensorDescription
+
+GRAY_NETWORK = "tofregnet"
+"""What is seen of a frame before any sample is taken comes from this network where the chosen one
+needs samples."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Parameters of the decision problem; `open_problem` makes one from a configuration.
+
+    Attributes
+    ----------
+    config : EnvConfig
+    bank : Bank
+    clips : tuple of Clip
+        Those of the chosen split.
+    kept : KeptPredictions
+        Predictions from the gray image of each of the bank's frames: the chosen network's, or
+        `GRAY_NETWORK`'s where that one needs samples.
+    fusion : Unwrapper or None
+        The chosen network where it needs samples: it predicts in each acquisition, from what that
+        has brought. None where `kept` is the prediction.
+    scenes : Scenes
+        What is seen of each frame before any sample is taken.
+    gray_exposure_s : float64 [N]
+        Exposure time of each frame's gray image.
+    network_macs : int
+        Multiply-accumulates of a frame's predictions, by both networks where there are two.
+    description : SensorDescription
+        What the correction must know of the sensor.
+    """
+
+    config: EnvConfig
+    bank: Bank
+    clips: tuple[Clip, ...]
+    kept: KeptPredictions
+    fusion: Unwrapper | None
+    scenes: Scenes
+    gray_exposure_s: Tensor
+    network_macs: int
+    description: SensorDescription
+
+    def __reduce__(self):
+        return (open_problem, (self.config,))
+
+    @property
+    def frame_period_s(self) -> float:
+        """Seconds from frame to frame."""
+        return 1.0 / self.config.frame_rate_hz
+
+
+@lru_cache(maxsize=4)
+def open_problem(config: EnvConfig) -> Problem:
+    """Open bank and network of `config`; environments of one process share the result.
+
+    Raises
+    ------
+    ValueError
+        The bank or the network is missing or damaged, the bank was rendered for a sensor with
+        other frequencies or timing, or a network that needs samples was trained for another one.
+    """
+    # Networks first: a bank may take minutes to render.
+    description = describe(config.sensor)
+    gray, fusion = load_networks(config.unwrapper, description)
+    bank = open_bank(config.bank)
+    check_fits(bank, config.sensor)
+    clips = bank.splits(config.split)
+    kept = keep_predictions(bank, gray)
+    networks = [gray] if fusion is None else [gray, fusion]
+    return Problem(
+        config=config,
+        bank=bank,
+        clips=clips,
+        kept=kept,
+        fusion=fusion,
+        scenes=look_at_scenes(bank, clips, kept, config.sensor),
+        gray_exposure_s=torch.from_numpy(bank.gray_exposure_s),
+        network_macs=sum(network.macs(bank.height, bank.width) for network in networks),
+        description=description,
+    )
+
+
+def load_networks(
+    name_or_path: str, description: SensorDescription
+) -> tuple[Unwrapper, Unwrapper | None]:
+    """The network that looks at the gray image alone, and the one that needs samples, if chosen.
+
+    Raises
+    ------
+    ValueError
+        The network is missing or damaged, or needs samples of another frequency.
+    """
+    unwrapper = load_unwrapper(name_or_path)
+    if unwrapper.network.needs == "gray":
+        return unwrapper, None
+    unwrapper.require_frequency(description)
+    return load_unwrapper(GRAY_NETWORK), unwrapper

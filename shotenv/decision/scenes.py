@@ -1,0 +1,74 @@
+"""What is seen of each bank frame before any sample is taken: computed once for a problem."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from shotenv.bank import Bank, Clip, KeptPredictions
+from shotenv.config import SensorConfig
+from shotenv.decision.features import SCENE_FEATURES, Scene, evaluated
+from shotenv.sensor import electrons_per_radiance_second, full_scale_lsb, gray_gain_lsb_per_e
+from unwrap.signal import unambiguous_range_m
+
+GRID = 8
+"""Cells down and across an image in which ambient light is compared from frame to frame."""
+DARKEST_RADIANCE = 1e-5
+"""Floor of the ambient radiance, W m-2 sr-1: a tenth of a moonless night's."""
+
+
+@dataclass(frozen=True)
+class Scenes:
+    """Scene features of every frame of a bank; rows of other splits are NaN.
+
+    Attributes
+    ----------
+    features : float32 [N, len(SCENE_FEATURES)]
+    log_ambient : float32 [N, GRID * GRID]
+        See `Scene`.
+    """
+
+    features: Tensor
+    log_ambient: Tensor
+
+    def change(self, before: Tensor, now: Tensor) -> Tensor:
+        """Mean absolute change of log10 ambient between bank frames [B], float32 [B]."""
+        return (self.log_ambient[now] - self.log_ambient[before]).abs_().mean(dim=1)
+
+
+def look_at_scenes(
+    bank: Bank, clips: tuple[Clip, ...], kept: KeptPredictions, sensor: SensorConfig
+) -> Scenes:
+    """Scene features of every frame of `clips`."""
+    features = torch.full((len(bank), len(SCENE_FEATURES)), torch.nan)
+    log_ambient = torch.full((len(bank), GRID * GRID), torch.nan)
+    for clip in clips:
+        frames = torch.arange(clip.start, clip.start + clip.frames)
+        scene = _scene(bank, frames, kept, sensor)
+        features[frames], log_ambient[frames] = evaluated(SCENE_FEATURES, scene), scene.log_ambient
+    return Scenes(features, log_ambient)
+
+
+def _scene(bank: Bank, frames: Tensor, kept: KeptPredictions, sensor: SensorConfig) -> Scene:
+    gray = bank.gray(frames).to(torch.float32) / full_scale_lsb(sensor.adc_bits)
+    prediction = kept.of(frames)
+    return Scene(
+        gray=gray,
+        log_ambient=log_ambient(gray, torch.from_numpy(bank.gray_exposure_s)[frames], sensor),
+        predicted_m=prediction.distance_m,
+        confidence=prediction.confidence,
+        unambiguous_m=unambiguous_range_m(sensor.f1_hz),
+        range_m=sensor.max_range_m,
+        ego_speed_m_s=torch.from_numpy(bank.ego_speed_m_s)[frames],
+        yaw_rate_rad_s=torch.from_numpy(bank.yaw_rate_rad_s)[frames],
+    )
+
+
+def log_ambient(gray: Tensor, exposure_s: Tensor, sensor: SensorConfig) -> Tensor:
+    """Log10 of the ambient radiance on a coarse grid, [B, GRID * GRID], W m-2 sr-1."""
+    full_scale_e = full_scale_lsb(sensor.adc_bits) / gray_gain_lsb_per_e(sensor)
+    scale = full_scale_e / (electrons_per_radiance_second(sensor) * exposure_s)
+    coarse = torch.nn.functional.adaptive_avg_pool2d(gray.unsqueeze(1), GRID).flatten(1)
+    return (coarse * scale[:, None].to(gray.dtype)).clamp_(min=DARKEST_RADIANCE).log10_()

@@ -1,0 +1,126 @@
+"""TODO."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from unwrap.support import array, loop
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class DepthScore:
+    """How good the depth of each frame is, over its scored pixels; float64 [B].
+
+    A pixel is scored where the truth lies within the range and the drive's own laser gives a
+    noise-free single-sample signal-to-noise ratio above `min_snr`: the same pixels whatever the
+    shots. In a frame with no scored pixel every policy has error 0 and shares 1.
+
+    Attributes
+    ----------
+    error : [B]
+        Mean of |e| / (|e| + scale) of the distance that is delivered, the best guess where it is
+        not valid; 1 where there is none. In 0..1.
+    depth_mae_m, depth_rmse_m : [B]
+        Over the valid ones; the scored range where there is none.
+    wrap_accuracy : [B]
+        Share that is valid and errs by less than half an unambiguous range.
+    valid_share : [B]
+        Share that is valid.
+    """
+
+    error: Tensor
+    depth_mae_m: Tensor
+    depth_rmse_m: Tensor
+    wrap_accuracy: Tensor
+    valid_share: Tensor
+
+
+FARTHEST_ERROR_M, ZERO = np.float32(1e9), np.float32(0.0)
+"""Stands for the error where there is no distance: its term is 1 within the rounding of a float."""
+
+
+def score_depth(
+    distance_m: Tensor,
+    valid: Tensor,
+    truth_m: Tensor,
+    scored: Tensor,
+    *,
+    error_scale_m: float,
+    unambiguous_m: float,
+    range_m: float,
+) -> DepthScore:
+    """Score depth float32 [B, H, W] against the truth over the pixels `scored`, bool [B, H, W].
+
+    Raises
+    ------
+    ValueError
+        The maps have different shapes.
+    """
+    shape = distance_m.shape
+    if not shape == valid.shape == truth_m.shape == scored.shape:
+        shapes = [tuple(maps.shape) for maps in (distance_m, valid, truth_m, scored)]
+        raise ValueError(f"distance_m, valid, truth_m and scored are {shapes}; expected one shape")
+    score = np.empty((5, len(distance_m)))
+    _score(
+        array(distance_m),
+        array(valid, np.bool_),
+        array(truth_m),
+        array(scored, np.bool_),
+        np.float32(error_scale_m),
+        np.float32(0.5 * unambiguous_m),
+        range_m,
+        score,
+    )
+    return DepthScore(*torch.from_numpy(score).unbind())
+
+
+@loop
+def _score(
+    distance_m: Array,
+    valid: Array,
+    truth_m: Array,
+    scored: Array,
+    scale_m: np.float32,
+    near_m: np.float32,
+    range_m: float,
+    score: Array,
+) -> None:
+    """The fields of a score, float64 [5, B], of maps [B, H, W].
+
+    Sums go column by column first: neighbours are summed side by side, in an order that does not
+    depend on the processor.
+    """
+    frames, rows, columns = distance_m.shape
+    for b in range(frames):
+        sums, counts = np.zeros((3, columns)), np.zeros((3, columns), np.int32)
+        for i in range(rows):
+            for j in range(columns):
+                error_m = abs(distance_m[b, i, j] - truth_m[b, i, j])
+                if not error_m < FARTHEST_ERROR_M:
+                    error_m = FARTHEST_ERROR_M
+                counted = scored[b, i, j]
+                good = counted & valid[b, i, j]
+                sums[0, j] += error_m / (error_m + scale_m) if counted else ZERO
+                sums[1, j] += error_m if good else ZERO
+                sums[2, j] += error_m * error_m if good else ZERO
+                counts[0, j] += counted
+                counts[1, j] += good
+                counts[2, j] += good & (error_m < near_m)
+        all_scored, all_valid, all_near = counts[0].sum(), counts[1].sum(), counts[2].sum()
+        score[0, b] = sums[0].sum() / all_scored if all_scored else 0.0
+        score[1, b] = sums[1].sum() / all_valid if all_valid else range_m
+        score[2, b] = np.sqrt(sums[2].sum() / all_valid) if all_valid else range_m
+        score[3, b] = all_near / all_scored if all_scored else 1.0
+        score[4, b] = all_valid / all_scored if all_scored else 1.0
+
+
+def no_depth(batch: int, range_m: float) -> DepthScore:
+    """Score of frames without laser: full error, nothing valid."""
+    one, zero = torch.ones(batch, dtype=torch.float64), torch.zeros(batch, dtype=torch.float64)
+    return DepthScore(one, one * range_m, one * range_m, zero, zero)

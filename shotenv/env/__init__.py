@@ -1,0 +1,5 @@
+"""Gymnasium's faces of the decision problem: one drive, or many in a batch."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,13 @@
+from .cost import ENERGY_PARTS as ENERGY_PARTS, ShotCost as ShotCost
+from .energy import (
+    efficiency_at as efficiency_at,
+    emitted_power_w as emitted_power_w,
+    shot_cost as shot_cost,
+)
+from .state import (
+    LaserState as LaserState,
+    laser_step as laser_step,
+    start_laser as start_laser,
+    too_bright as too_bright,
+)
+from .thermal import case_step as case_step, junction_step as junction_step, trip_step as trip_step

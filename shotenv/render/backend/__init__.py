@@ -1,0 +1,5 @@
+"""What rendering runs on: the LLVM library, the device, worker processes."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

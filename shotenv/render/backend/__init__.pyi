@@ -1,0 +1,11 @@
+from .device import only_where as only_where, upload as upload
+from .llvm import (
+    CURE as CURE,
+    OLDEST_LLVM as OLDEST_LLVM,
+    RendererError as RendererError,
+    find_llvm as find_llvm,
+    require_device as require_device,
+    require_llvm as require_llvm,
+    start_mitsuba as start_mitsuba,
+)
+from .workers import available_cores as available_cores, run_jobs as run_jobs

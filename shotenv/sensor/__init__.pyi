@@ -1,0 +1,29 @@
+from .acquisition import (
+    Sensitivity as Sensitivity,
+    acquire as acquire,
+    expose as expose,
+    light_of as light_of,
+    scored_pixels as scored_pixels,
+    sensitivity as sensitivity,
+)
+from .converter import full_scale_lsb as full_scale_lsb
+from .description import describe as describe
+from .drift import (
+    imager_temperature_k as imager_temperature_k,
+    residual_drift_m as residual_drift_m,
+)
+from .electrons import electrons_per_radiance_second as electrons_per_radiance_second
+from .exposure import Exposure as Exposure
+from .gray import (
+    capture_gray as capture_gray,
+    gray_exposure_s as gray_exposure_s,
+    gray_gain_lsb_per_e as gray_gain_lsb_per_e,
+    sample_noise_lsb as sample_noise_lsb,
+)
+from .noise import (
+    Purpose as Purpose,
+    noise_samples as noise_samples,
+    stream as stream,
+    stream_seed as stream_seed,
+)
+from .offsets import OffsetPattern as OffsetPattern, draw_offsets as draw_offsets

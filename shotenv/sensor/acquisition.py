@@ -1,0 +1,206 @@
+"""The acquisition: light -> electrons -> noise -> full well -> converter -> RawFrame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import repeat
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from shotenv.config import SensorConfig
+from shotenv.sensor.converter import signed_limits_lsb
+from shotenv.sensor.electrons import electrons_per_radiance_second
+from shotenv.sensor.exposure import Exposure
+from shotenv.sensor.offsets import OffsetPattern
+from shotenv.sensor.pixels import Light, Pixel, strong_pixels, take_sample
+from unwrap.signal import RawFrame, Shots
+from unwrap.support import array
+
+
+def expose(
+    exposure: Exposure,
+    sensor: SensorConfig,
+    *,
+    shots: Shots,
+    laser_power_w: Tensor,
+    integration_s: Tensor,
+    noise: Tensor | None,
+    offsets: OffsetPattern | None,
+) -> RawFrame:
+    """Acquire a batch of frames with `shots` samples each.
+
+    Parameters
+    ----------
+    exposure : Exposure
+        Noise-free light, batch B.
+    sensor : SensorConfig
+        The imager.
+    shots : Shots
+        2, 4 or 8 samples; the first samples of `exposure.correlation` are taken.
+    laser_power_w, integration_s : [B]
+        Optical power while on, W, and integration time of one sample, s.
+    noise : float32 [B, n, 2, H, W] or None
+        Standard normals of tap A and tap B, n >= shots; None leaves shot and read noise out.
+    offsets : OffsetPattern or None
+        Fixed pattern; None leaves it out, its ambient part too.
+
+    Raises
+    ------
+    ValueError
+        The light is NaN, infinite or of the wrong shape; the message names the array.
+    """
+    shots = Shots(shots)
+    check_exposure(exposure, shots)
+    check_settings(exposure, shots, laser_power_w, integration_s, noise)
+    samples = None if noise is None else noise.unbind(1)
+    light = light_of(exposure, sensitivity(sensor, laser_power_w, integration_s))
+    return acquire(light, sensor, shots=shots, noise=samples, offsets=offsets)
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Electrons of one sample per unit of light, at a laser power and integration time.
+
+    Attributes
+    ----------
+    ambient_e : float32 [B]
+        Per W m-2 sr-1 of ambient radiance.
+    active_e : float32 [B]
+        Per W m-2 sr-1 and watt of active radiance and its correlation.
+    """
+
+    ambient_e: Tensor
+    active_e: Tensor
+
+
+def sensitivity(sensor: SensorConfig, laser_power_w: Tensor, integration_s: Tensor) -> Sensitivity:
+    """Sensitivity at a laser power and an integration time, each [B]."""
+    ambient_e = electrons_per_radiance_second(sensor) * integration_s
+    active_e = ambient_e * laser_power_w
+    return Sensitivity(ambient_e.to(torch.float32), active_e.to(torch.float32))
+
+
+def acquire(
+    light: Light,
+    sensor: SensorConfig,
+    *,
+    shots: Shots,
+    noise: Iterable[Tensor] | None,
+    offsets: OffsetPattern | None,
+) -> RawFrame:
+    """Noise, full well and converter for light that is known to be sound; see `expose`.
+
+    Sample after sample, so that what one sample needs stays in the processor's cache; `noise`
+    gives the normals [B, 2, H, W] of each.
+    """
+    shape = batch, height, width = light.active.shape
+    pixel = pixel_of(sensor)
+    if offsets is None:
+        offsets = OffsetPattern(torch.zeros(shape), torch.zeros(shape))
+        pixel = pixel._replace(ambient_lsb_per_e=np.float32(0))
+    if noise is None:
+        noise = repeat(torch.zeros(batch, 2, height, width))
+    dcs_lsb = np.empty((batch, int(shots), height, width), np.float32)
+    saturated = np.zeros(shape, np.bool_)
+    # A loop trusts shapes: one sensor serves all frames only where that is spelled out.
+    made = array(offsets.pattern_lsb.expand(shape)), pixel, dcs_lsb, saturated
+    for number, normals in zip(range(shots), noise, strict=False):
+        take_sample(number, light, array(normals), *made)
+    return RawFrame(torch.from_numpy(dcs_lsb), torch.from_numpy(saturated))
+
+
+def scored_pixels(light: Light, truth_m: Tensor, sensor: SensorConfig) -> Tensor:
+    """Pixels that count, bool [B, H, W], whatever is measured there.
+
+    Truth [B, H, W] within `max_range_m`, noise-free signal to noise of one sample,
+    `m S / sqrt(S + B + 2 sigma_r^2)`, above `min_snr`.
+
+    Raises
+    ------
+    ValueError
+        The truth is not of the light's shape.
+    """
+    if truth_m.shape != light.active.shape:
+        raise ValueError(f"truth_m is {tuple(truth_m.shape)}; expected {light.active.shape}")
+    scored = np.empty(light.active.shape, np.bool_)
+    limits = np.float32(sensor.max_range_m), np.float32(sensor.min_snr)
+    strong_pixels(light, pixel_of(sensor), array(truth_m), *limits, scored)
+    return torch.from_numpy(scored)
+
+
+def light_of(exposure: Exposure, per_light: Sensitivity) -> Light:
+    """Light as the loops over pixels take it, of exposures in memory."""
+    return Light(
+        correlation=array(exposure.correlation),
+        active=array(exposure.active),
+        ambient=array(exposure.ambient),
+        active_e=array(per_light.active_e),
+        ambient_e=array(per_light.ambient_e),
+    )
+
+
+@lru_cache(maxsize=64)
+def pixel_of(sensor: SensorConfig) -> Pixel:
+    """Constants that the loops over pixels need of a sensor."""
+    low_lsb, high_lsb = signed_limits_lsb(sensor.adc_bits)
+    return Pixel(
+        contrast=np.float32(sensor.contrast),
+        read_variance_e=np.float32(sensor.read_noise_e**2),
+        full_well_e=np.float32(sensor.full_well_e),
+        gain_lsb_per_e=np.float32(sensor.gain_lsb_per_e),
+        ambient_lsb_per_e=np.float32(sensor.offset_ambient_lsb / (2.0 * sensor.full_well_e)),
+        low_lsb=np.float32(low_lsb),
+        high_lsb=np.float32(high_lsb),
+    )
+
+
+def check_exposure(exposure: Exposure, shots: Shots) -> None:
+    """Refuse light that cannot be acquired.
+
+    Raises
+    ------
+    ValueError
+        Too few samples, a shape that does not fit, NaN or infinity; the message names the array.
+    """
+    batch, samples, height, width = exposure.correlation.shape
+    if samples < shots:
+        raise ValueError(f"correlation has {samples} samples; expected at least {int(shots)}")
+    maps = {"active": exposure.active, "ambient": exposure.ambient}
+    for name, value in maps.items():
+        if value.shape != (batch, height, width):
+            raise ValueError(f"{name} is {tuple(value.shape)}; expected {(batch, height, width)}")
+        if not bool((value >= 0).all()):
+            raise ValueError(f"{name} holds NaN or a negative radiance; expected finite values")
+    for name, value in {"correlation": exposure.correlation[:, :shots], **maps}.items():
+        if not bool(torch.isfinite(value).all()):
+            raise ValueError(f"{name} holds NaN or infinity; expected finite radiance")
+
+
+def check_settings(
+    exposure: Exposure,
+    shots: Shots,
+    laser_power_w: Tensor,
+    integration_s: Tensor,
+    noise: Tensor | None,
+) -> None:
+    """Refuse laser power, integration time or noise that do not fit the light.
+
+    Raises
+    ------
+    ValueError
+        A shape that does not fit, a negative or not finite setting; the message names it.
+    """
+    batch, _, height, width = exposure.correlation.shape
+    for name, value in {"laser_power_w": laser_power_w, "integration_s": integration_s}.items():
+        if value.shape != (batch,) or not bool(((value >= 0) & torch.isfinite(value)).all()):
+            raise ValueError(f"{name} is {value.tolist()}; expected {batch} finite values >= 0")
+    if noise is None:
+        return
+    expected = (batch, int(shots), 2, height, width)
+    fits = noise.ndim == 5 and noise[:, :shots].shape == expected
+    if not fits or not bool(torch.isfinite(noise).all()):
+        raise ValueError(f"noise is {tuple(noise.shape)}; expected finite normals {expected}")

@@ -1,0 +1,1 @@
+from .draw import draw_world as draw_world

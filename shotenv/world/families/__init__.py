@@ -1,0 +1,5 @@
+"""Families of scenes: how each is laid out, and its traffic."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

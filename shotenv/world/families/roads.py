@@ -1,0 +1,240 @@
+"""Roads, streets and car parks under the open sky. The ego's lane is centred on y = 0."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shotenv.world.families.traffic import (
+    crossing,
+    cyclists,
+    lead,
+    oncoming,
+    pavement_thing,
+    roadside_thing,
+    row,
+    street_lamps,
+    walkers,
+)
+from shotenv.world.geometry import Mesh, Site, materials as m, meshes
+from shotenv.world.things import buildings, furniture, plants, shelters, vehicles
+from unwrap.support import Range
+
+BEHIND_M = 60.0
+SHOP_RADIANCE = (2e-3, 5e-2)
+REACH_M = 120.0
+KERB_M = 0.12
+PAINT_M = 0.008
+PUDDLE_M = 0.013
+
+
+def country_road(site: Site, rng: np.random.Generator) -> None:
+    """Two lanes, verges, trees, signs, guard rails, traffic."""
+    lane, far = rng.uniform(3.0, 3.75), site.travel_m + REACH_M
+    right, left = -lane / 2 - 0.4, 1.5 * lane + 0.4
+    carriageway(site, rng, right, left, lane)
+    verge = (m.GRASS if rng.random() < 0.7 else m.SOIL).draw(rng)
+    for y in ((-REACH_M, right), (left, REACH_M)):
+        site.build(meshes.patch((-BEHIND_M, far), y, 0.0, verge))
+    oncoming(site, rng, lane)
+    lead(site, rng)
+    walkers(site, rng, (0, 3), (right - 1.5, right - 0.6))
+    cyclists(site, rng, right + 0.35)
+    if rng.random() < 0.4:
+        rail = furniture.guard_rail if rng.random() < 0.6 else furniture.jersey_barrier
+        length, x = rng.uniform(12.0, 30.0), site.travel_m / 2 + rng.uniform(6, 20)
+        site.put(rail(rng, length), x, right - 0.7, np.pi / 2)
+    if rng.random() < 0.3:
+        length = rng.uniform(6, 16)
+        x = site.travel_m + rng.uniform(5, 15)
+        site.put(hedge_or_wall(rng, length), x, left + 1.5, -np.pi / 2)
+    street_lamps(site, rng, right - 1.2, rng.uniform(18, 30))
+    row(site, rng, roadside_thing, right - 1.3, 3.5, np.pi, share=0.75, spread=2.0)
+    row(site, rng, roadside_thing, left + 1.3, 4.5, 0.0, share=0.7, spread=3.0)
+    row(site, rng, plants.tree, right - 6.0, 9.0, 0.0, share=0.5, spread=3.0)
+
+
+def town_street(site: Site, rng: np.random.Generator) -> None:
+    """A street between facades with pavements, parked cars and people who cross."""
+    lane, far = rng.uniform(2.8, 3.4), site.travel_m + REACH_M
+    parking = rng.uniform(2.0, 2.3)
+    parking_left = parking if rng.random() < 0.5 else 0.3
+    right, left = -lane / 2 - parking, 1.5 * lane + parking_left
+    pavement = rng.uniform(1.8, 3.2)
+    carriageway(site, rng, right, left, lane, edge_lines=False)
+    paving = m.PAVING.draw(rng)
+    for side, kerb in ((-1, right), (1, left)):
+        site.build(side_walk(rng, side, kerb, (-BEHIND_M, far), paving))
+    facades(site, rng, right - pavement, np.pi / 2)
+    facades(site, rng, left + pavement, -np.pi / 2)
+    lead(site, rng)
+    oncoming(site, rng, lane)
+    crossing(site, rng, (right + 0.3, left - 0.3))
+    walkers(site, rng, (1, 4), (right - pavement + 0.5, right - 0.5), KERB_M)
+    walkers(site, rng, (0, 3), (left + 0.5, left + pavement - 0.5), KERB_M)
+    cyclists(site, rng, -lane / 2 - 0.1)
+    row(
+        site,
+        rng,
+        vehicles.parked_car,
+        right + parking / 2 + 0.05,
+        5.8,
+        0.0,
+        share=rng.uniform(0.3, 0.9),
+    )
+    if parking_left == parking:
+        row(
+            site,
+            rng,
+            vehicles.parked_car,
+            left - parking / 2,
+            6.0,
+            np.pi,
+            share=rng.uniform(0.2, 0.8),
+        )
+    street_lamps(site, rng, right - 0.5, rng.uniform(13, 20), KERB_M)
+    row(site, rng, pavement_thing, right - 0.5, 2.6, np.pi, KERB_M, share=0.6)
+    row(site, rng, pavement_thing, left + 0.5, 3.5, 0.0, KERB_M, share=0.5)
+
+
+def car_park(site: Site, rng: np.random.Generator) -> None:
+    """The ego noses up to a wall, a hedge or a car; more cars and people beside."""
+    far = site.travel_m + REACH_M
+    ground = (m.ASPHALT if rng.random() < 0.6 else m.PAVING).draw(rng)
+    site.build(meshes.patch((-BEHIND_M, far), (-REACH_M, REACH_M), 0.0, ground))
+    end = site.travel_m + 0.7 + 5.0 * rng.uniform() ** 1.5
+    bays(site, rng, end, rng.uniform(2.5, 2.9))
+    puddles(site, rng, (-5.0, 5.0))
+    ahead = rng.random()
+    if ahead < 0.35:
+        car, facing = vehicles.car(rng), np.pi if rng.random() < 0.5 else 0.0
+        half_length = float(car.corners[..., 0].max())
+        site.put(car, end + half_length, rng.uniform(-0.4, 0.4), facing)
+        site.put(backdrop(rng), end + rng.uniform(7, 14), rng.uniform(-3, 3), np.pi)
+    elif ahead < 0.9:
+        site.put(backdrop(rng), end, rng.uniform(-2, 2), np.pi)
+    for x in np.arange(end - 3.0, end + 12.0, 5.5):
+        for y in (-5.4, -2.7, 2.7, 5.4):
+            if rng.random() < 0.5:
+                site.put(
+                    vehicles.parked_car(rng), x, y + rng.uniform(-0.2, 0.2), rng.integers(2) * np.pi
+                )
+    crossing(site, rng, (-4.0, 4.0), near=0.9)
+    walkers(site, rng, (1, 4), (-6.0, 6.0))
+    row(site, rng, pavement_thing, 0.0, 2.5, 0.0, share=0.5, spread=5.0)
+    street_lamps(site, rng, -rng.uniform(3, 6), 14.0)
+
+
+def carriageway(
+    site: Site,
+    rng: np.random.Generator,
+    right: float,
+    left: float,
+    lane: float,
+    edge_lines: bool = True,
+) -> None:
+    """Asphalt from `right` to `left` with a dashed middle line, edge lines, perhaps a zebra."""
+    far = site.travel_m + REACH_M
+    site.build(meshes.patch((-BEHIND_M, far), (right, left), 0.0, m.ASPHALT.draw(rng)))
+    paint = m.ROAD_PAINT.draw(rng)
+    period, dash = ((9.0, 4.5), (6.0, 3.0), (4.0, 2.0))[rng.integers(3)]
+    for x in np.arange(-2 * period + rng.uniform(0, period), site.travel_m + 50.0, period):
+        site.build(meshes.patch((x, x + dash), (lane / 2 - 0.06, lane / 2 + 0.06), PAINT_M, paint))
+    if edge_lines:
+        for y in (right + 0.2, left - 0.2):
+            site.build(meshes.patch((-BEHIND_M, far), (y - 0.06, y + 0.06), PAINT_M, paint))
+    if rng.random() < 0.3:
+        start = site.travel_m * rng.uniform() + rng.uniform(4, 12)
+        for y in np.arange(right + 0.3, left - 0.6, 1.0):
+            site.build(meshes.patch((start, start + 3.5), (y, y + 0.5), PAINT_M + 0.002, paint))
+    if rng.random() < 0.5:
+        patches(site, rng, right, left)
+    puddles(site, rng, (right, left))
+
+
+def patches(site: Site, rng: np.random.Generator, right: float, left: float) -> None:
+    """Repaired asphalt and manhole covers."""
+    for layer in range(rng.integers(1, 5)):
+        height = 0.002 + 0.001 * layer
+        x, y = rng.uniform(2, 20 + site.travel_m), rng.uniform(right + 0.8, left - 0.8)
+        if rng.random() < 0.5:
+            tar = m.ASPHALT.draw(rng)
+            length, half = rng.uniform(0.8, 4.0), rng.uniform(0.3, 0.7)
+            site.build(meshes.patch((x, x + length), (y - half, y + half), height, tar))
+        else:
+            outline = furniture.regular_polygon(10, 0.33, 0.0)
+            disc = [(x + u, y + v, height) for u, v in outline]
+            site.build(meshes.polygon(disc, m.DARK_METAL.draw(rng)))
+
+
+def puddles(site: Site, rng: np.random.Generator, y: Range) -> None:
+    """Water that stands on wet ground between `y`: the more, the wetter."""
+    for _ in range(rng.integers(4, 12) if site.weather.wetness else 0):
+        length, half = rng.uniform(0.4, 2.5), rng.uniform(0.2, 0.8) * site.weather.wetness
+        x = site.travel_m * rng.uniform() + rng.uniform(2.0, 16.0)
+        middle, turn = rng.uniform(y[0] + half, y[1] - half), rng.uniform(0, 2 * np.pi)
+        outline = furniture.regular_polygon(9, 1.0, turn)
+        disc = [(x + length * u, middle + half * v, PUDDLE_M) for u, v in outline]
+        site.build(meshes.polygon(disc, m.WATER.draw(rng)))
+
+
+def side_walk(
+    rng: np.random.Generator, side: int, kerb: float, x: tuple[float, float], paving: m.Material
+) -> Mesh:
+    """A raised pavement beyond a kerb stone; `side` is -1 on the right."""
+    stone, inner = m.CONCRETE.draw(rng), kerb + side * 0.15
+    across = sorted((kerb, inner))
+    outer = sorted((inner, side * REACH_M))
+    middle, length = sum(x) / 2, x[1] - x[0]
+    return meshes.join(
+        [
+            meshes.box((length, 0.15, KERB_M), stone, (middle, sum(across) / 2, 0.0)),
+            meshes.patch(x, (outer[0], outer[1]), KERB_M, paving),
+        ]
+    )
+
+
+def facades(site: Site, rng: np.random.Generator, y: float, yaw: float) -> None:
+    """Buildings, walls, hedges and gaps along a line."""
+    x = rng.uniform(-12.0, -4.0)
+    while x < site.travel_m + 32.0:
+        length, kind = rng.uniform(6.0, 12.0), rng.random()
+        centre = x + length / 2
+        if kind < 0.25:
+            glow = m.log_uniform(rng, SHOP_RADIANCE) if site.night and rng.random() < 0.6 else 0.0
+            site.put(shelters.shop_front(rng, length, glow), centre, y, yaw, KERB_M)
+        elif kind < 0.65:
+            site.put(buildings.facade(rng, length, site.night), centre, y, yaw, KERB_M)
+        elif kind < 0.9:
+            site.put(hedge_or_wall(rng, length), centre, y, yaw, KERB_M)
+        x += length + rng.choice([0.2, 0.2, 3.0])
+
+
+def backdrop(rng: np.random.Generator) -> Mesh:
+    """What a parking bay ends at: wall, facade, garage door, hedge or fence."""
+    length, kind = rng.uniform(6.0, 14.0), rng.integers(7)
+    if kind == 0:
+        return buildings.facade(rng, length)
+    if kind == 1:
+        return buildings.roller_door(rng)
+    if kind == 2:
+        return furniture.fence(rng, length)
+    if kind == 3:
+        return shelters.glass_railing(rng, length)
+    if kind == 4:
+        return shelters.shop_front(rng, length)
+    return hedge_or_wall(rng, length)
+
+
+def hedge_or_wall(rng: np.random.Generator, length_m: float) -> Mesh:
+    """Either, with its front facing +x."""
+    if rng.random() < 0.35:
+        return plants.hedge(rng, length_m)
+    return buildings.wall(rng, length_m, rng.uniform(0.8, 2.6))
+
+
+def bays(site: Site, rng: np.random.Generator, end: float, width: float) -> None:
+    """Lines between parking bays, to both sides of the ego's."""
+    paint = m.ROAD_PAINT.draw(rng)
+    for i in range(-4, 4):
+        y = (i + 0.5) * width
+        site.build(meshes.patch((end - 5.2, end - 0.3), (y - 0.05, y + 0.05), PAINT_M, paint))

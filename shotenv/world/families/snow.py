@@ -1,0 +1,181 @@
+"""A village street deep in snow. Held out from training."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from shotenv.world.families.roads import BEHIND_M, REACH_M
+from shotenv.world.families.traffic import (
+    TRIES,
+    approaching,
+    crossing,
+    lead,
+    one_of,
+    row,
+    street_lamps,
+    walkers,
+)
+from shotenv.world.geometry import Material, Mesh, Motion, Pose, Site, materials as m, meshes
+from shotenv.world.things import cab, nose_lamps, people, plants, vehicles, wheel
+
+
+def snowy_street(site: Site, rng: np.random.Generator) -> None:
+    """A cleared lane between banks of snow, chalets, snowed-in cars and trees."""
+    half, far = rng.uniform(2.4, 3.4), site.travel_m + REACH_M
+    site.build(meshes.patch((-BEHIND_M, far), (-REACH_M, REACH_M), 0.0, m.SNOW.draw(rng)))
+    wheel_tracks(site, rng)
+    lead(site, rng)
+    if rng.random() < 0.5:
+        x, lane = rng.uniform(8.0, 24.0) + 0.5 * site.travel_m, rng.uniform(0.5, 0.9) * half
+        draw = snow_plough if rng.random() < 0.6 else vehicles.traffic
+        approaching(site, rng, Motion(Pose((x, lane, 0.0), np.pi), rng.uniform(2.0, 8.0)), draw)
+    crossing(site, rng, (-half, half))
+    for _ in range(rng.integers(0, 3)):
+        tow(site, rng, half)
+    walkers(site, rng, (0, 3), (-half + 0.3, half - 0.3))
+    if rng.random() < 0.4:
+        x = site.travel_m + 1.0 + 6.0 * rng.uniform() ** 1.5
+        blocking = one_of(rng, (snow_bank, snowman))
+        site.put(blocking, x - float(blocking.corners[..., 0].min()), rng.uniform(-0.8, 0.8), np.pi)
+    street_lamps(site, rng, -half - 0.6, rng.uniform(14, 24))
+    for side in (-1, 1):
+        row(site, rng, roadside, side * (half + 0.9), 2.6, -side * np.pi / 2, share=0.9)
+        row(site, rng, vehicles.parked_car, side * (half + 2.9), 6.0, np.pi, share=0.4)
+        row(site, rng, chalet, side * (half + 6.5), 9.5, -side * np.pi / 2, share=0.7, spread=0.8)
+        row(site, rng, plants.conifer, side * (half + 4.6), 4.0, 0.0, share=0.6, spread=1.0)
+
+
+def wheel_tracks(site: Site, rng: np.random.Generator) -> None:
+    """Two strips where wheels have worn the snow down to the asphalt, of both lanes or one."""
+    asphalt, far = m.ASPHALT.draw(rng), site.travel_m + REACH_M
+    worn = Material(asphalt.albedo_low, rng.uniform(0.2, 0.8), 2.0, mirror=0.03)
+    for y in (-0.75, 0.75, 2.0, 3.2)[: 2 * rng.integers(1, 3)]:
+        site.shelter(meshes.patch((-BEHIND_M, far), (y - 0.18, y + 0.18), 0.004, worn))
+
+
+def tow(site: Site, rng: np.random.Generator, half: float) -> None:
+    """Somebody who pulls a sledge along the street."""
+    mesh, speed = sledge(rng), rng.uniform(0.7, 1.4)
+    for _ in range(TRIES):
+        place = (site.travel_m + rng.uniform(1.5, 12.0), rng.uniform(-half, half), 0.0)
+        yaw = rng.integers(2) * np.pi + rng.uniform(-0.2, 0.2)
+        if site.move(mesh, Motion(Pose(place, yaw), speed)):
+            return
+
+
+def roadside(rng: np.random.Generator) -> Mesh:
+    """What stands at the edge of a cleared street."""
+    return one_of(rng, (snow_bank, snow_bank, snow_bank, snow_bank, snowman, marker_stake))
+
+
+@meshes.thing
+def snow_bank(rng: np.random.Generator) -> Mesh:
+    """Snow thrown up by a plough, in lumps along y."""
+    snow, high = m.SNOW.draw(rng), rng.uniform(0.3, 0.9)
+    lumps = [
+        meshes.blob(rng, 0.65, snow, (rng.uniform(-0.1, 0.1), y, 0.0)) for y in (-0.6, 0.0, 0.6)
+    ]
+    return meshes.scaled(meshes.join(lumps), (1.0, 1.0, high / 0.65))
+
+
+@meshes.thing
+def snowman(rng: np.random.Generator) -> Mesh:
+    """Three balls of snow with a hat."""
+    snow, coal, size = m.SNOW.draw(rng), m.RUBBER.draw(rng), rng.uniform(0.7, 1.2)
+    balls = [(0.42, 0.36), (0.30, 0.92), (0.20, 1.34)]
+    parts = [meshes.ball(radius, snow, (0.0, 0.0, z), detail=1) for radius, z in balls]
+    hat = meshes.lathe([(0.24, 0.0), (0.24, 0.03), (0.15, 0.03), (0.14, 0.25), (0.0, 0.25)], coal,
+                       (0.0, 0.0, 1.48))  # fmt: skip
+    arms = [
+        meshes.rod((0, 0.2 * s, 1.0), (0.1, 0.75 * s, 1.25), 0.02, m.BARK.draw(rng), sections=4)
+        for s in (-1, 1)
+    ]
+    return meshes.scaled(meshes.join([*parts, hat, *arms]), (size, size, size))
+
+
+@meshes.thing
+def marker_stake(rng: np.random.Generator) -> Mesh:
+    """A stake that shows ploughs where the road ends, with a retro-reflecting band."""
+    high = rng.uniform(1.6, 2.4)
+    band = [(0.033, high - 0.4), (0.033, high - 0.2)]
+    return meshes.join(
+        [
+            meshes.rod((0, 0, 0), (0, 0, high), 0.03, m.WOOD.draw(rng), sections=6),
+            meshes.lathe(band, m.RETRO_SHEET.draw(rng), sections=6),
+        ]
+    )
+
+
+@meshes.thing
+def chalet(rng: np.random.Generator) -> Mesh:
+    """A wooden house with a steep roof that overhangs, its gable facing +x."""
+    wood, roof, glass = m.WOOD.draw(rng), m.DARK_METAL.draw(rng), m.GLASS.draw(rng)
+    width, depth, eaves = rng.uniform(5.0, 7.0), rng.uniform(4.0, 6.0), rng.uniform(2.4, 3.2)
+    half, ridge = width / 2, eaves + width * rng.uniform(0.35, 0.5)
+    gable = [(0.0, -half, eaves), (0.0, half, eaves), (0.0, 0.0, ridge)]
+    over, low = 0.6, eaves - 0.25
+    slopes = [
+        [(over, -half - 0.4, low), (over, 0.0, ridge + 0.1), (-depth, 0.0, ridge + 0.1),
+         (-depth, -half - 0.4, low)],
+        [(over, 0.0, ridge + 0.1), (over, half + 0.4, low), (-depth, half + 0.4, low),
+         (-depth, 0.0, ridge + 0.1)],
+    ]  # fmt: skip
+    panes = [
+        meshes.front((y, y + 0.8), (z, z + 1.0), 0.02, glass)
+        for y, z in ((-0.4 * width, 1.0), (0.25 * width, 1.0), (-0.4, eaves + 0.2))
+    ]
+    return meshes.join(
+        [
+            meshes.box((depth, width, eaves), wood, (-depth / 2, 0.0, 0.0)),
+            meshes.polygon(gable, wood),
+            *(meshes.polygon(slope, roof) for slope in slopes),
+            *panes,
+            meshes.front((-0.45, 0.45), (0.0, 2.05), 0.025, m.DARK_METAL.draw(rng)),
+            meshes.box((0.5, 0.5, 1.2), m.BRICK.draw(rng), (-depth / 2, 0.5 * half, ridge - 0.5)),
+        ]
+    )
+
+
+@meshes.thing
+def snow_plough(rng: np.random.Generator, headlight_radiance: float = 0.0) -> Mesh:
+    """A lorry that grits the road behind a wide blade."""
+    front, width, blade = 2.6, 2.3, m.MACHINE_PAINT.draw(rng)
+    tyre, rim, half = m.TYRE.draw(rng), m.METAL.draw(rng), 1.4
+    curve = [(0.0, 0.05), (0.12, 0.0), (0.05, 0.5), (0.3, 1.0), (0.2, 1.02), (-0.08, 0.5)]
+    plate = meshes.join(
+        meshes.polygon(
+            [(front + 0.6 + a[0], -half, a[1]), (front + 0.6 + a[0], half, a[1]),
+             (front + 0.6 + b[0], half, b[1]), (front + 0.6 + b[0], -half, b[1])], blade
+        )
+        for a, b in pairwise(curve)
+    )  # fmt: skip
+    hopper = [(-2.5, 1.0), (0.5, 1.0), (0.7, 2.2), (-2.7, 2.2)]
+    edge = meshes.back((-half, half), (0.0, 0.06), front + 0.6, blade)
+    return meshes.join(
+        [
+            cab(rng, front, width),
+            meshes.box((5.0, 0.8, 0.4), m.DARK_METAL.draw(rng), (0.0, 0.0, 0.6)),
+            meshes.extrude(hopper, 2.0, m.MACHINE_PAINT.draw(rng)),
+            plate,
+            edge,
+            meshes.box((0.7, 0.8, 0.3), rim, (front + 0.3, 0.0, 0.35)),
+            nose_lamps(rng, front + 0.02, width, headlight_radiance),
+            *(wheel(x, s, width / 2, 0.46, tyre, rim) for x in (1.7, -1.6) for s in (-1, 1)),
+        ]
+    )
+
+
+@meshes.thing
+def sledge(rng: np.random.Generator) -> Mesh:
+    """Somebody who pulls a sledge, often with a child on it."""
+    wood, rope = m.WOOD.draw(rng), m.LEATHER.draw(rng)
+    runners = [meshes.box((1.0, 0.04, 0.14), wood, (-1.6, y, 0.0)) for y in (-0.18, 0.18)]
+    seat = meshes.box((0.9, 0.44, 0.04), wood, (-1.6, 0.0, 0.14))
+    line = meshes.rod((-1.1, 0.0, 0.1), (-0.1, 0.2, 0.86), 0.01, rope, sections=3)
+    parts = [people.adult(rng, people.STRIDE_S), *runners, seat, line]
+    if rng.random() < 0.6:
+        parts.append(meshes.scaled(people.torso(rng, (-1.7, 0.0, 0.18)), (1.0, 1.0, 1.0)))
+        parts.append(people.head(rng, (-1.66, 0.0, 1.02)))
+    return meshes.join(parts)

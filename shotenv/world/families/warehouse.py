@@ -1,0 +1,257 @@
+"""A warehouse: aisles between racks, fork lifts, docks. Held out from training."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shotenv.world.families.construction import at_work
+from shotenv.world.families.roads import BEHIND_M, PAINT_M, REACH_M
+from shotenv.world.families.traffic import crossing, one_of, row, walkers
+from shotenv.world.geometry import (
+    Indoor,
+    Lamp,
+    Material,
+    Mesh,
+    Motion,
+    Pose,
+    Site,
+    lights,
+    materials as m,
+    meshes,
+)
+from shotenv.world.things import people, wheel
+from unwrap.support import Range
+
+RACK_DEPTH_M = 1.1
+BAY_M = 2.7
+LAMP_M = (0.6, 0.4)
+
+
+def hall(site: Site, rng: np.random.Generator, irradiance: Range) -> None:
+    """An aisle between racks that ends at docks; `irradiance` below one lamp, W m-2."""
+    aisle, height = rng.uniform(3.2, 4.4), rng.uniform(5.5, 8.5)
+    near = rng.random() < 0.4
+    end = site.travel_m + (1.0 + 5.0 * rng.uniform() if near else rng.uniform(9.0, 28.0))
+    half = aisle / 2 + 2 * RACK_DEPTH_M + 2.8
+    shell(site, rng, end, half, height)
+    lines(site, rng, end, aisle)
+    site.enclose((-10.0, end - 0.05), (-half + 0.05, half - 0.05), height - 0.5)
+    crossing(site, rng, (-aisle / 2, aisle / 2), near=0.8, draw=at_work)
+    fork_lifts(site, rng, end, aisle)
+    walkers(site, rng, (0, 2), (-aisle / 2 + 0.3, aisle / 2 - 0.3), draw=at_work)
+    for side in (-1, 1):
+        y = side * (aisle / 2 + RACK_DEPTH_M / 2 + 0.1)
+        row(site, rng, floor_thing, side * (aisle / 2 - 0.35), 3.0, 0.0, share=0.35)
+        for x in np.arange(-1.0, min(end - 3.0, site.travel_m + 24.0), BAY_M + 0.02):
+            site.put(pallet_rack(rng, min(3, int((height - 1.0) / 1.7))), x, y, -side * np.pi / 2)
+    for y in np.arange(-half + 1.5, half - 1.0, 1.7):
+        site.put(one_of(rng, (pallet, pallet, drum, pallet_jack)), end - rng.uniform(1, 2.2), y)
+    high_bays(site, rng, end, height, irradiance)
+
+
+def shell(site: Site, rng: np.random.Generator, end: float, half: float, height: float) -> None:
+    """Floor, clad walls, a roof on trusses, and an end wall with docks, one of them open or not."""
+    cladding, roof, steel = m.METAL.draw(rng), m.WHITE_PAINT.draw(rng), m.METAL.draw(rng)
+    x = (-12.0, end)
+    middle, length = sum(x) / 2, end - x[0]
+    site.build(meshes.patch((x[0], end + 0.3), (-half, half), 0.0, m.COATED_FLOOR.draw(rng)))
+    site.build(meshes.box((length, 2 * half + 1.0, 0.3), roof, (middle, 0.0, height)))
+    for along in np.arange(x[0] + 3.0, end, 6.0):
+        site.build(meshes.box((0.2, 2 * half, 0.45), steel, (along, 0.0, height - 0.45)))
+        for side in (-1, 1):
+            column = meshes.box((0.3, 0.3, height), steel, (along, side * (half - 0.15), 0.0))
+            site.build(column)
+    for side in (-1, 1):
+        wall = meshes.box((length, 0.3, height), cladding, (middle, side * (half + 0.15), 0.0))
+        site.build(wall)
+    site.build(meshes.box((0.3, 2 * half, height), cladding, (x[0] - 0.15, 0.0, 0.0)))
+    docks(site, rng, end, half, height, cladding)
+
+
+def docks(
+    site: Site, rng: np.random.Generator, end: float, half: float, height: float, wall: Material
+) -> None:
+    """The end wall with three gates, the middle one perhaps open on a yard in daylight."""
+    box = (-BEHIND_M, -half - 1.0, -1.0), (end, half + 1.0, height + 0.3)
+    width, high, is_open = 3.0, 3.4, rng.random() < 0.45
+    site.indoor = Indoor(*box, ((-width / 2, 0.0), (width / 2, high)) if is_open else None)
+    beside = half - width / 2
+    for side in (-1, 1):
+        y = side * (half + width / 2) / 2
+        site.put(meshes.box((0.3, beside, height), wall), end + 0.15, y)
+        site.build(meshes.at(dock_door(rng, width), end - 0.02, side * 4.2, yaw=np.pi))
+    lintel = meshes.box((0.3, width, height - high), wall, (end + 0.15, 0.0, high))
+    site.build(lintel)
+    if is_open:
+        yard = (end, end + REACH_M), (-REACH_M, REACH_M)
+        site.build(meshes.patch(*yard, -0.01, m.ASPHALT.draw(rng)))
+        return
+    site.build(meshes.box((0.1, width, high), wall, (end + 0.25, 0.0, 0.0)))
+    site.build(meshes.at(dock_door(rng, width), end + 0.1, 0.0, yaw=np.pi))
+
+
+@meshes.thing
+def dock_door(rng: np.random.Generator, width_m: float) -> Mesh:
+    """A sectional door with a row of small panes between two buffers of rubber."""
+    light, rubber, glass = m.WHITE_PAINT.draw(rng), m.RUBBER.draw(rng), m.GLASS.draw(rng)
+    half = width_m / 2
+    sections = [meshes.box((0.05, width_m, 0.55), light, (0.03, 0.0, 0.551 * i)) for i in range(6)]
+    panes = [
+        meshes.front((y, y + 0.4), (1.8, 2.1), 0.062, glass) for y in np.arange(-1.2, 1.0, 0.6)
+    ]
+    sides = [meshes.box((0.2, 0.2, 3.4), rubber, (0.1, y, 0.0)) for y in (-half, half)]
+    return meshes.join([*sections, *panes, *sides])
+
+
+def lines(site: Site, rng: np.random.Generator, end: float, aisle: float) -> None:
+    """Painted edges of the aisle."""
+    paint = m.ROAD_PAINT.draw(rng)
+    for y in (-aisle / 2 + 0.1, aisle / 2 - 0.1):
+        site.build(meshes.patch((-10.0, end - 0.3), (y - 0.05, y + 0.05), PAINT_M, paint))
+
+
+def floor_thing(rng: np.random.Generator) -> Mesh:
+    """Something left beside the aisle."""
+    return one_of(rng, (pallet, pallet, drum, pallet_jack))
+
+
+def fork_lifts(site: Site, rng: np.random.Generator, end: float, aisle: float) -> None:
+    """Perhaps a fork lift in the aisle, coming, going or standing."""
+    if rng.random() < 0.35:
+        return
+    speed = rng.uniform(0.8, 3.0) if rng.random() < 0.7 else 0.0
+    x, yaw = site.travel_m + rng.uniform(4.0, 10.0), rng.integers(2) * np.pi
+    offset = (aisle / 2 - 0.9) * rng.uniform(-0.6, 1.0)
+    site.move(fork_lift(rng), Motion(Pose((min(x, end - 3.0), offset, 0.0), yaw), speed))
+
+
+def high_bays(
+    site: Site, rng: np.random.Generator, end: float, height: float, irradiance: Range
+) -> None:
+    """Lamps under the roof along the aisle."""
+    drop = height - 0.6
+    intensity = lights.intensity_for(rng, irradiance, drop)
+    radiance, metal = lights.face_radiance(intensity, LAMP_M[0] * LAMP_M[1]), m.METAL.draw(rng)
+    for x in np.arange(-5.0, end - 1.0, rng.uniform(4.0, 6.5)):
+        site.build(high_bay(metal, radiance, float(x), drop))
+        site.lamps.append(Lamp((float(x), 0.0, drop - 0.1), intensity, 0.4, cutoff_cos=0.2))
+
+
+def high_bay(metal: Material, radiance: float, x: float, z: float) -> Mesh:
+    """A lamp in a flat housing that hangs at height `z`."""
+    half, wide = LAMP_M[0] / 2, LAMP_M[1] / 2
+    ring = [(x - half, -wide), (x - half, wide), (x + half, wide), (x + half, -wide)]
+    face = meshes.polygon([(*corner, z - 0.01) for corner in ring], metal.glowing(radiance))
+    return meshes.join(
+        [meshes.box((LAMP_M[0] + 0.1, LAMP_M[1] + 0.1, 0.12), metal, (x, 0, z)), face]
+    )
+
+
+@meshes.thing
+def pallet_rack(rng: np.random.Generator, levels: int) -> Mesh:
+    """One bay of shelves along y with goods on pallets; a few places are empty."""
+    frame, beam, half = m.METAL.draw(rng), m.MACHINE_PAINT.draw(rng), BAY_M / 2
+    step, deep = 1.7, RACK_DEPTH_M / 2
+    parts = [
+        meshes.box((0.09, 0.09, step * levels + 0.4), frame, (x, y, 0.0))
+        for x in (-deep + 0.05, deep - 0.05)
+        for y in (-half + 0.06, half - 0.06)
+    ]
+    for level in range(levels):
+        z = step * level
+        if level:
+            parts += [
+                meshes.box((0.05, BAY_M - 0.2, 0.12), beam, (x, 0.0, z - 0.12))
+                for x in (-deep + 0.05, deep - 0.05)
+            ]
+        parts += [
+            meshes.at(load(rng), rng.uniform(-0.05, 0.05), y, z)
+            for y in (-0.65, 0.65)
+            if rng.random() < 0.8
+        ]
+    return meshes.join(parts)
+
+
+def load(rng: np.random.Generator) -> Mesh:
+    """A pallet's slab with a block of cartons or sacks, some wrapped in glossy film."""
+    height = rng.uniform(0.4, 1.25)
+    goods = (m.CARDBOARD, m.CARDBOARD, m.PLASTIC, m.CLOTHES, m.DARK_CLOTHES)[rng.integers(5)]
+    size = (rng.uniform(0.75, 1.0), rng.uniform(0.8, 1.1), height)
+    block = meshes.box(size, goods.draw(rng), (0.0, 0.0, 0.141))
+    return meshes.join([meshes.box((0.95, 1.15, 0.14), m.WOOD.draw(rng)), block])
+
+
+@meshes.thing
+def pallet(rng: np.random.Generator) -> Mesh:
+    """A pallet on the floor: boards on blocks, empty, stacked or loaded with cartons."""
+    wood, card = m.WOOD.draw(rng), m.CARDBOARD.draw(rng)
+    layers = rng.integers(1, 7) if rng.random() < 0.3 else 1
+    parts = []
+    for z in 0.15 * np.arange(layers):
+        parts += [meshes.box((1.2, 0.1, 0.1), wood, (0.0, y, z)) for y in (-0.35, 0.0, 0.35)]
+        parts.append(meshes.box((1.2, 0.8, 0.04), wood, (0.0, 0.0, z + 0.10)))
+    top = 0.15 * layers - 0.009
+    if layers == 1 and rng.random() < 0.7:
+        for x in (-0.3, 0.3):
+            sizes = rng.uniform(0.3, 0.9, 2)
+            parts.append(meshes.box((0.55, 0.7, sizes[0]), card, (x, 0.0, top)))
+            parts.append(meshes.box((0.4, 0.5, 0.4 * sizes[1]), card, (x, 0.0, top + sizes[0])))
+    return meshes.join(parts)
+
+
+@meshes.thing
+def drum(rng: np.random.Generator) -> Mesh:
+    """One or a few steel drums with their ribs."""
+    spots = ((0.0, 0.0), (0.62, 0.05), (0.28, 0.55))[: rng.integers(1, 4)]
+    profile = [
+        (0.29, 0.0), (0.29, 0.29), (0.305, 0.31), (0.29, 0.33),
+        (0.29, 0.58), (0.305, 0.60), (0.29, 0.62), (0.29, 0.88), (0.0, 0.88),
+    ]  # fmt: skip
+    return meshes.join(
+        meshes.lathe(profile, m.MACHINE_PAINT.draw(rng), (x, y, 0.0), sections=10) for x, y in spots
+    )
+
+
+@meshes.thing
+def pallet_jack(rng: np.random.Generator) -> Mesh:
+    """A hand truck: two forks close to the floor and a tiller."""
+    paint, tyre = m.MACHINE_PAINT.draw(rng), m.RUBBER.draw(rng)
+    forks = [meshes.box((1.15, 0.16, 0.06), paint, (0.0, y, 0.08)) for y in (-0.2, 0.2)]
+    rollers = [meshes.box((0.12, 0.1, 0.08), tyre, (x, y, 0.0)) for x in (0.5, -0.6)
+               for y in (-0.2, 0.2)]  # fmt: skip
+    head = meshes.box((0.25, 0.4, 0.35), paint, (-0.65, 0.0, 0.081))
+    tiller = meshes.rod((-0.7, 0.0, 0.4), (-1.0, 0.0, 1.15), 0.025, m.DARK_METAL.draw(rng), 5)
+    grip = meshes.rod((-1.0, -0.18, 1.15), (-1.0, 0.18, 1.15), 0.02, tyre, sections=5)
+    return meshes.join([*forks, *rollers, head, tiller, grip])
+
+
+@meshes.thing
+def fork_lift(rng: np.random.Generator) -> Mesh:
+    """A counterbalanced truck with mast, forks, overhead guard and driver, perhaps a load."""
+    paint, dark, tyre = m.MACHINE_PAINT.draw(rng), m.DARK_METAL.draw(rng), m.TYRE.draw(rng)
+    lift = rng.uniform(0.08, 0.4)
+    body = [(-1.05, 0.25), (0.75, 0.2), (0.75, 0.55), (-0.2, 0.75), (-1.05, 1.0)]
+    posts = [
+        meshes.rod((x, y, 0.6), (top, y, 2.1), 0.035, dark, sections=5)
+        for x, top in ((0.7, 0.5), (-0.9, -0.7))
+        for y in (-0.45, 0.45)
+    ]
+    masts = [meshes.box((0.12, 0.1, 2.2), dark, (0.9, y, 0.06)) for y in (-0.3, 0.3)]
+    forks = [meshes.box((1.05, 0.12, 0.05), dark, (1.5, y, lift)) for y in (-0.3, 0.3)]
+    driver = [
+        people.torso(rng, (-0.25, 0.0, 0.85)),
+        people.head(rng, (-0.22, 0.0, 1.70)),
+    ]
+    parts = [
+        meshes.extrude(body, 1.1, paint),
+        *posts,
+        *masts,
+        *forks,
+        *driver,
+        meshes.box((1.3, 1.0, 0.06), dark, (-0.1, 0.0, 2.1)),
+        meshes.box((0.08, 0.8, 0.5), dark, (1.0, 0.0, lift)),
+        *(wheel(x, side, 0.53, 0.28, tyre, paint) for x in (0.5, -0.7) for side in (-1, 1)),
+    ]
+    if rng.random() < 0.5:
+        parts.append(meshes.at(load(rng), 1.55, 0.0, lift + 0.06))
+    return meshes.join(parts)

@@ -1,0 +1,112 @@
+"""Passive light in band: sun, sky and lamps.
+
+Numbers are for 940 +- 15 nm. Direct sun is ASTM G173's 11.6 W m-2 (air mass 1.5), scaled with air
+mass by Meinel's clearness law; sky radiances and lamp intensities are assumed ranges.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shotenv.world.geometry.materials import log_uniform
+from shotenv.world.geometry.model import Lamp, Light
+from unwrap.support import Range
+
+G173_IRRADIANCE = 11.6
+G173_AIR_MASS = 1.5
+LOW_SUN_RAD = np.radians(15.0)
+"""Elevation below which the sun counts as low."""
+DUSK_RADIANCE = 5e-3
+"""Radiance of the sky below which lamps are lit, W m-2 sr-1."""
+BRIGHTEST_FACE = 2.0
+"""Radiance at which lamp faces are capped, W m-2 sr-1: about a white wall in the sun."""
+
+
+def sun_irradiance(elevation_rad: float) -> float:
+    """Direct sun in band on a surface that faces it, clear air, W m-2; at most G173's.
+
+    Transmission 0.7 ** (air mass ** 0.678) (Meinel and Meinel, 1976), relative to air mass 1.5;
+    air mass by Kasten and Young (1989), which holds down to the horizon.
+    """
+    degrees = np.degrees(elevation_rad)
+    air_mass = 1.0 / (np.sin(elevation_rad) + 0.50572 * (degrees + 6.07995) ** -1.6364)
+    relative = 0.7 ** (air_mass**0.678 - G173_AIR_MASS**0.678)
+    return float(G173_IRRADIANCE * min(1.0, relative))
+
+
+def direction(azimuth_rad: float, elevation_rad: float) -> tuple[float, float, float]:
+    """Unit vector from azimuth (from x towards y) and elevation."""
+    level = np.cos(elevation_rad)
+    return (
+        float(level * np.cos(azimuth_rad)),
+        float(level * np.sin(azimuth_rad)),
+        float(np.sin(elevation_rad)),
+    )
+
+
+def sunny(rng: np.random.Generator, low_share: float = 0.3) -> Light:
+    """Sun and a blue sky; the sun is low with probability `low_share`."""
+    return low_sun(rng) if rng.random() < low_share else high_sun(rng)
+
+
+def low_sun(rng: np.random.Generator) -> Light:
+    """Sun at 2.5 to 15 degrees: long shadows; the sky is darker overhead, bright at the horizon."""
+    elevation, haze = np.radians(rng.uniform(2.5, 15.0)), rng.uniform(0.0, 0.35)
+    zenith = rng.uniform(0.12, 0.3)
+    return Light(
+        sun_irradiance=sun_irradiance(elevation) * (1.0 - haze),
+        sun_direction=direction(rng.uniform(-np.pi, np.pi), elevation),
+        sky_zenith=zenith,
+        sky_horizon=zenith * rng.uniform(1.4, 2.2),
+        lamps=(),
+    )
+
+
+def high_sun(rng: np.random.Generator) -> Light:
+    """Sun at 15 to 60 degrees, more or less haze, and a sky that is brighter at the horizon."""
+    elevation, haze = np.radians(rng.uniform(15.0, 60.0)), rng.uniform(0.0, 0.35)
+    zenith = rng.uniform(0.3, 0.45)
+    return Light(
+        sun_irradiance=sun_irradiance(elevation) * (1.0 - haze),
+        sun_direction=direction(rng.uniform(-np.pi, np.pi), elevation),
+        sky_zenith=zenith,
+        sky_horizon=zenith * rng.uniform(1.1, 1.4),
+        lamps=(),
+    )
+
+
+def overcast(rng: np.random.Generator) -> Light:
+    """No sun; the sky is up to three times brighter overhead than at the horizon (CIE overcast)."""
+    zenith = log_uniform(rng, (0.2, 1.0))
+    return Light(0.0, (0.0, 0.0, 1.0), zenith, zenith / rng.uniform(1.8, 3.0), ())
+
+
+def night(rng: np.random.Generator) -> Light:
+    """A dark sky, and often the ego's own head lights."""
+    sky = log_uniform(rng, (3e-5, 3e-4))
+    lamps = ego_headlights(rng) if rng.random() < 0.75 else ()
+    return Light(0.0, (0.0, 0.0, 1.0), sky, 1.5 * sky, lamps)
+
+
+def is_dark(light: Light) -> bool:
+    """Whether the sky is so dark that streets, windows and vehicles have their lamps on."""
+    return light.sky_zenith < DUSK_RADIANCE
+
+
+def ego_headlights(rng: np.random.Generator) -> tuple[Lamp, ...]:
+    """Two head lights beside the camera: LED ones hardly shine in band, halogen ones do."""
+    intensity = log_uniform(rng, (0.05, 3.0))
+    return tuple(
+        Lamp((0.2, y, 0.65), intensity, 0.1, direction(0.0, -0.05), float(np.cos(0.45)), rides=True)
+        for y in (-0.65, 0.65)
+    )
+
+
+def face_radiance(intensity_w_sr: float, area_m2: float) -> float:
+    """Radiance of a lamp's own face, capped so that it stays of the order of a sunlit wall."""
+    return min(intensity_w_sr / area_m2, BRIGHTEST_FACE)
+
+
+def intensity_for(rng: np.random.Generator, irradiance: Range, height_m: float) -> float:
+    """Intensity, W sr-1, that gives an irradiance drawn from a range straight below a lamp."""
+    return log_uniform(rng, irradiance) * height_m**2

@@ -1,0 +1,5 @@
+"""Things that stand, drive and walk in worlds."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,168 @@
+import json
+
+import pytest
+from report_sample import made_up_results, made_up_strip, made_up_timeline
+
+from agents.cli.doctor import Finding
+from agents.cli.entry import COMMANDS, main
+from agents.report.results import FRAMES, RESULTS, TIMELINE, write_strip
+from shotenv.config.families import FAMILIES
+from unwrap.support.files import write_json
+
+
+def run(capsys, *words):
+    status = main([str(word) for word in words])
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+@pytest.fixture
+def tiny(tiny_bank, tiny_unwrapper):
+    return ("--env.bank", tiny_bank, "--env.unwrapper", tiny_unwrapper)
+
+
+def test_overview_lists_every_command(capsys):
+    status, out, _ = run(capsys, "--help")
+    assert status == 0
+    for command in COMMANDS:
+        assert command.words in out
+    assert run(capsys)[0] == 2
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.words)
+def test_every_command_explains_itself(capsys, command):
+    status, out, _ = run(capsys, *command.words.split(), "--help")
+    assert status == 0 and f"shotenv {command.words}" in out
+    assert callable(command.function)
+
+
+def test_a_group_lists_its_commands(capsys):
+    status, out, _ = run(capsys, "bank", "--help")
+    assert status == 0 and "bank info" in out and "doctor" not in out
+    assert run(capsys, "bank")[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("fly",), "'fly'; expected one of doctor"),
+        (("demo", "--agent.gamm", "1"), "agent.gamm"),
+        (("demo", "--agent.gamma", "3"), "agent.gamma"),
+        (("demo", "--env.sensor.f1_hz", "24 MHz"), "f1_hz"),
+        (("demo", "--env.sensor.f2_hz", "30e6"), "f2_hz"),
+        (("demo", "--config", "/no/such.yaml"), "such.yaml"),
+        (("render", "--train_clips", "-1"), "train_clips"),
+    ],
+)
+def test_wrong_usage_is_one_sentence_and_status_2(capsys, words, says):
+    status, out, err = run(capsys, *words)
+    assert status == 2 and out == ""
+    assert says in err and err.count("\n") == 1 and "Traceback" not in err
+
+
+def test_an_unknown_key_in_a_file_is_named(capsys, tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text("agent: {gamma: 0.9, lambda: 1}\n")
+    status, _, err = run(capsys, "demo", "--config", path)
+    assert status == 2 and "lambda" in err and err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("bank", "info", "/no/bank"), "/no/bank"),
+        (("report", "/no/results"), "results.json is missing"),
+        (("train", "--env.bank", "/no/bank"), "/no/bank"),
+        (("unwrap", "evaluate", "/no/net"), "/no/net"),
+    ],
+)
+def test_failures_are_one_sentence_and_status_1(capsys, words, says):
+    status, _, err = run(capsys, *words)
+    assert status == 1 and says in err.splitlines()[-1] and "Traceback" not in err
+
+
+def test_a_missing_scheduler_names_its_cure(capsys, tmp_path, tiny):
+    status, _, err = run(capsys, "evaluate", tmp_path, *tiny)
+    assert status == 1 and "agent.json" in err and "shotenv train" in err
+
+
+def test_bank_info_and_verify(capsys, tiny_bank, tmp_path):
+    status, out, _ = run(capsys, "bank", "info", tiny_bank, "--json", tmp_path / "n.json")
+    assert status == 0 and "64 frames of 32 x 24 pixels" in out
+    assert json.loads((tmp_path / "n.json").read_text())["frames"] == 64
+    assert run(capsys, "bank", "verify", tiny_bank)[0] == 0
+
+
+def test_a_damaged_bank_is_told_from_a_good_one(capsys, tmp_path, tiny_bank):
+    import shutil
+
+    shutil.copytree(tiny_bank, tmp_path / "bank")
+    path = next((tmp_path / "bank").glob("clips/*/gray.npy"))
+    content = bytearray(path.read_bytes())
+    content[-1] ^= 1
+    path.write_bytes(bytes(content))
+    status, _, err = run(capsys, "bank", "verify", tmp_path / "bank")
+    assert status == 1 and str(path) in err
+
+
+def test_report_is_written_anew(capsys, tmp_path):
+    write_json(tmp_path / RESULTS, made_up_results())
+    write_json(tmp_path / TIMELINE, made_up_timeline())
+    write_strip(tmp_path / FRAMES, made_up_strip())
+    status, out, _ = run(capsys, "report", tmp_path)
+    assert status == 0 and out.strip() == str(tmp_path / "report.html")
+    assert (tmp_path / "report.html").stat().st_size > 10**6
+
+
+def test_demo_does_the_main_job(capsys, tmp_path, tiny):
+    out = tmp_path / "demo"
+    small = (
+        "--agent.total_steps 64 --agent.num_envs 2 --agent.rollout_steps 16 --agent.batch_size 16"
+    )
+    small += " --env.frames_per_drive 16 --study.drives 2 --study.tuning_drives 2"
+    small += " --study.bootstrap_draws 100"
+    words = ("demo", "--out", out, "--json", tmp_path / "n.json", *small.split(), *tiny)
+    status, printed, _ = run(capsys, *words)
+    assert status == 0 and printed.rstrip().endswith(str(out / "report.html"))
+    results = json.loads((out / "results.json").read_text())
+    assert results == json.loads((tmp_path / "n.json").read_text())
+    assert set(results["policies"]) == {
+        *("ppo", "snr_threshold", "cycle", "random"),
+        *("always_2", "always_4", "always_8", "always_8_guarded"),
+    }
+    for policy in results["policies"].values():
+        assert set(policy["return"]) == {"mean", "low", "high"}
+        assert sum(policy["shots_share"]) == pytest.approx(1.0)
+    assert results["drives"] == 2 and results["seeds"] == [1000, 1001]
+
+
+def test_problem_writes_its_numbers(capsys, tmp_path, tiny):
+    words = ("--env.frames_per_drive", 8, "--study.drives", 2, "--study.tuning_drives", 2)
+    path = tmp_path / "problem.json"
+    status, out, _ = run(capsys, "problem", *words, "--json", path, *tiny)
+    assert status == 0 and "Clairvoyant optimum over 2 test drives" in out
+    shares = json.loads(path.read_text())["optimum"]["shots_share"]
+    assert sum(share["mean"] for share in shares.values()) == pytest.approx(1.0)
+
+
+def test_unwrap_evaluate_scores_every_method(capsys, tmp_path, tiny_bank, tiny_unwrapper):
+    path = tmp_path / "scores.json"
+    words = ("unwrap", "evaluate", tiny_unwrapper, "--bank", tiny_bank, "--json", path)
+    status, out, err = run(capsys, *words)
+    assert status == 0, err
+    found = json.loads(path.read_text())
+    assert "8 DCS" in out and found["frames"] == 20
+    eight, wrapped = found["methods"]["8 DCS"], found["methods"]["4 DCS wrap 0"]
+    assert eight["wrap_accuracy"] > 0.9 and eight["mae_m"] < 0.5 * wrapped["mae_m"]
+    assert set(found["families"]) == set(FAMILIES)
+
+
+def test_doctor_exits_by_what_it_finds(capsys, monkeypatch, tmp_path):
+    good = Finding("python", True, "3.11")
+    bad = Finding("LLVM", False, "no library found", "apt-get install libllvm19")
+    monkeypatch.setattr("agents.cli.doctor.examine", lambda: (good,))
+    assert run(capsys, "doctor")[0] == 0
+    monkeypatch.setattr("agents.cli.doctor.examine", lambda: (good, bad))
+    status, out, _ = run(capsys, "doctor", "--json", tmp_path / "found.json")
+    assert status == 1 and "mend it with: apt-get install libllvm19" in out
+    assert json.loads((tmp_path / "found.json").read_text())[1]["well"] is False

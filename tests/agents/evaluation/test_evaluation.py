@@ -1,0 +1,184 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from agents.config.demo import DemoConfig
+from agents.config.study import StudyConfig
+from agents.evaluation.headroom import measure_problem
+from agents.evaluation.play import FIXED, Played, play_drives
+from agents.evaluation.study import (
+    evaluate_scheduler,
+    make_envs,
+    play_all,
+    train_scheduler,
+    tune_rule,
+)
+from agents.evaluation.summary import best_fixed, best_rival, difference, summary
+from agents.optimum.choices import threshold, tuned_rule
+from agents.optimum.dynamic import clairvoyant
+from agents.optimum.table import play
+from agents.optimum.tabulation import tabulate
+from agents.policies.fixed import FixedPolicy, RandomPolicy
+from agents.policies.guard import ThermalGuard
+from agents.policies.learned import PpoPolicy
+from agents.policies.rules import SnrThresholdPolicy
+from agents.report.strip import take_strip
+from shotenv.config.env import RewardConfig
+from shotenv.config.reader import configs_dir, merged, read_config
+from shotenv.decision.features import FEATURE_NAMES
+from shotenv.decision.problem import open_problem
+
+SEEDS = [1000, 1001, 1002]
+HOT = {"thermal_resistance_k_per_w": 200.0, "thermal_time_constant_s": 1.0}
+
+
+@pytest.fixture(scope="module")
+def config(tiny_bank, tiny_unwrapper) -> DemoConfig:
+    """The demo on the tiny bank, with a laser that gets hot soon enough to trip."""
+    whole = read_config(DemoConfig, configs_dir() / "demo.yaml")
+    return merged(
+        whole,
+        {
+            "env": {
+                "bank": tiny_bank,
+                "unwrapper": tiny_unwrapper,
+                "frames_per_drive": 24,
+                "laser": HOT,
+            },
+            "agent": {"total_steps": 96, "num_envs": 2, "rollout_steps": 24, "batch_size": 16},
+            "study": {"drives": 3, "tuning_drives": 2, "bootstrap_draws": 200},
+        },
+    )
+
+
+@pytest.fixture(scope="module")
+def possible(config):
+    problem = open_problem(config.env.model_copy(update={"split": "test"}))
+    return tabulate(problem, SEEDS)
+
+
+def test_tables_tell_what_the_environment_does(config, possible):
+    envs = make_envs(config.env, "test", len(SEEDS), "Disabled")
+    table = possible.table(config.env.reward)
+    rule = (float(np.median(table.snr)), 2, 0)
+    for policy, choose in [
+        (FixedPolicy(8), lambda now: np.full(now.snr.shape, 2)),
+        (SnrThresholdPolicy(FEATURE_NAMES, rule[0], below=8, above=2), threshold(*rule)),
+    ]:
+        played, on_table = play_drives(policy, envs, SEEDS), play(table, choose)
+        np.testing.assert_allclose(played.per_drive["return"], -on_table.cost, rtol=1e-9)
+        np.testing.assert_array_equal(played.shots == 0, on_table.actions < 0)
+    assert (on_table.actions == 2).any() and (on_table.actions == 0).any()
+
+
+def test_the_hot_laser_trips_and_the_optimum_beats_every_fixed_choice(config, possible):
+    table = possible.table(config.env.reward)
+    eight = play(table, lambda now: np.full(now.snr.shape, 2))
+    assert eight.tripped_share > 0
+    assert (clairvoyant(table).cost <= eight.cost + 1e-9).all()
+
+
+def test_a_drive_is_the_same_in_any_autoreset_mode(config):
+    one, other = (
+        play_drives(RandomPolicy(3), make_envs(config.env, "test", 3, mode), SEEDS)
+        for mode in ("Disabled", "SameStep")
+    )
+    for field in dataclasses.fields(Played):
+        np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
+
+
+def test_frames_without_laser_have_no_error_and_no_share(config):
+    envs = make_envs(config.env, "test", 3, "Disabled")
+    played = play_drives(FixedPolicy(8), envs, SEEDS)
+    off = played.shots == 0
+    assert off.any() and np.isnan(played.depth_mae_m[off]).all()
+    assert np.isfinite(played.depth_mae_m[~off]).all()
+    assert played.shots_share() == [0.0, 0.0, 1.0]
+    np.testing.assert_allclose(played.per_drive["tripped_share"], off.mean(axis=1))
+
+
+def made_up_played(rewards):
+    shape = np.shape(rewards)
+    ones = np.ones(shape)
+    return Played(
+        seeds=np.arange(shape[0]),
+        shots=np.full(shape, 4),
+        reward=np.asarray(rewards, float),
+        laser_energy_j=ones,
+        energy_j=2 * ones,
+        depth_mae_m=0.1 * ones,
+        wrap_accuracy=0.9 * ones,
+        temperature_k=300 * ones,
+        family=np.full(shape, "garage"),
+    )
+
+
+def test_summary_pairs_every_policy_with_the_best_fixed_choice():
+    study = StudyConfig(bootstrap_draws=500)
+    base = np.random.default_rng(0).normal(-1, 1, (6, 4))
+    played = {name: made_up_played(base - i) for i, name in enumerate(FIXED)}
+    played["ppo"] = made_up_played(base + 0.5)
+    results = summary(played, study, scheduler="ppo")
+    assert results["best_fixed"] == best_fixed(played) == "always_2"
+    assert results["paired_to_best_fixed"]["ppo"] == pytest.approx(
+        {"difference": 2.0, "low": 2.0, "high": 2.0}
+    )
+    assert results["best_rival"] == best_rival(played, "ppo") == "always_2"
+    assert results["paired_to_best_rival"]["difference"] == pytest.approx(2.0)
+    assert results["paired_to_best_fixed"]["always_4"]["difference"] == pytest.approx(-4.0)
+    assert results["policies"]["ppo"]["energy_j"] == {"mean": 8.0, "low": 8.0, "high": 8.0}
+    assert results["families"]["ppo"] == {"garage": [0.0, 1.0, 0.0]}
+    assert difference(played["ppo"], played["ppo"], study).value == 0.0
+
+
+def test_the_tuned_rule_is_the_best_on_the_drives_that_tuned_it(config):
+    rule = tune_rule(config)
+    problem = open_problem(config.env.model_copy(update={"split": "validation"}))
+    table = tabulate(problem, [1000, 1001]).table(config.env.reward)
+    best = tuned_rule(table)
+    assert (rule.threshold, rule.below.action, rule.above.action) == best
+    cost = play(table, threshold(*best)).cost.sum()
+    for limit in (0.2, 0.5, 0.8):
+        assert cost <= play(table, threshold(limit, 2, 0)).cost.sum() + 1e-9
+
+
+def test_problem_numbers_follow_the_weights(config, possible):
+    study = config.study
+    free = measure_problem(possible, possible, RewardConfig(duty=0, power=0, trip=0), study)
+    dear = measure_problem(possible, possible, RewardConfig(power=50.0), study)
+    assert free["optimum"]["shots_share"]["8"]["mean"] > 0.0
+    assert dear["optimum"]["shots_share"]["2"]["mean"] == 1.0
+    assert dear["excess"]["best_fixed"]["excess"] == pytest.approx(0.0)
+    assert dear["excess"]["best_fixed"]["choice"] == "always 2" and not dear["holds"]
+    assert free["excess"]["best_blind"]["excess"] <= free["excess"]["best_fixed"]["excess"] + 1e-12
+
+
+def test_strip_shows_the_frames_that_were_played(config):
+    played = play_all(config, {"always_8": FixedPolicy(8)})["always_8"]
+    problem = open_problem(config.env.model_copy(update={"split": "test"}))
+    strip = take_strip(problem, played)
+    assert set(strip.family.tolist()) == set(played.family.ravel().tolist())
+    assert (strip.shots == 8).all()
+    for i in range(len(strip.frame)):
+        drive = played.seeds.tolist().index(strip.drive[i])
+        assert played.depth_mae_m[drive, strip.frame[i]] == strip.depth_mae_m[i]
+        scored = strip.valid[i] & (strip.truth_m[i] <= strip.max_range_m)
+        error_m = np.abs(strip.corrected_m[i][scored] - strip.truth_m[i][scored])
+        assert np.median(error_m) < 0.5
+
+
+def test_train_and_evaluate_write_everything_the_report_needs(config, tmp_path):
+    from agents.report.page import write_report
+
+    scheduler = train_scheduler(config, tmp_path / "agent")
+    results = evaluate_scheduler(config, scheduler, tmp_path)
+    page = write_report(tmp_path).read_text()
+    assert "PPO scheduler" in page and str(results["drives"]) in page
+    written = {path.name for path in tmp_path.iterdir()}
+    assert written >= {"results.json", "drives.csv", "timeline.json", "frames.npz", "report.html"}
+    other = PpoPolicy(
+        scheduler.network, scheduler.config, ThermalGuard(("heat_margin",), (0, 0, 0))
+    )
+    with pytest.raises(ValueError, match="other features"):
+        evaluate_scheduler(config, other, tmp_path)

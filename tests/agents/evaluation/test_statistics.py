@@ -1,0 +1,59 @@
+import numpy as np
+import pytest
+
+from agents.evaluation.statistics import Interval, excess, interval, mean, mean_difference
+
+SETTINGS = {"draws": 2000, "confidence": 0.95}
+
+
+def test_interval_of_a_mean_matches_the_normal_one():
+    values = np.random.default_rng(3).normal(2.0, 1.0, 400)
+    found = interval(mean, values, **SETTINGS)
+    half_width = 1.96 * values.std(ddof=1) / np.sqrt(values.size)
+    assert found.value == pytest.approx(values.mean())
+    assert found.low == pytest.approx(values.mean() - half_width, abs=0.02)
+    assert found.high == pytest.approx(values.mean() + half_width, abs=0.02)
+
+
+def test_interval_covers_the_truth_as_often_as_it_says():
+    rng = np.random.default_rng(7)
+    trials = [
+        interval(mean, rng.normal(0.0, 1.0, 24), draws=400, confidence=0.9) for _ in range(150)
+    ]
+    covered = np.mean([found.low <= 0.0 <= found.high for found in trials])
+    assert 0.82 <= covered <= 0.96
+
+
+def test_pairing_removes_what_the_drives_share():
+    rng = np.random.default_rng(0)
+    drive = rng.normal(0.0, 10.0, 30)
+    better, worse = drive + 1.0 + rng.normal(0, 0.1, 30), drive
+    paired = interval(mean_difference, better, worse, **SETTINGS)
+    assert paired.excludes_zero and paired.low == pytest.approx(1.0, abs=0.1)
+    assert not interval(mean, better, **SETTINGS).excludes_zero
+
+
+def test_a_constant_sample_has_an_interval_of_no_width():
+    assert interval(mean, [3.0] * 5, **SETTINGS) == Interval(3.0, 3.0, 3.0)
+
+
+def test_excess_is_the_ratio_of_sums():
+    assert excess(np.array([3.0, 3.0]), np.array([2.0, 3.0])) == pytest.approx(0.2)
+
+
+def test_same_seed_same_interval():
+    values = np.arange(10.0)
+    assert interval(mean, values, seed=4, **SETTINGS) == interval(mean, values, seed=4, **SETTINGS)
+    assert interval(mean, values, seed=4, **SETTINGS) != interval(mean, values, seed=5, **SETTINGS)
+
+
+def test_named_renames_the_point_estimate():
+    assert Interval(1.0, 0.5, 2.0).named("mean") == {"mean": 1.0, "low": 0.5, "high": 2.0}
+
+
+@pytest.mark.parametrize(
+    "samples", [([1.0],), ([1.0, 2.0], [1.0]), ([1.0, np.nan],), ([[1.0, 2.0]],)]
+)
+def test_unusable_samples_are_refused(samples):
+    with pytest.raises(ValueError, match="samples"):
+        interval(mean, *samples, **SETTINGS)

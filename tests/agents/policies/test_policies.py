@@ -1,0 +1,85 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents.config.agent import AgentConfig
+from agents.policies.fixed import CyclePolicy, FixedPolicy, RandomPolicy
+from agents.policies.guard import ThermalGuard
+from agents.policies.learned import PpoPolicy, build_network
+from agents.policies.rules import SnrThresholdPolicy
+
+NAMES = ("gray_mean", "signal_to_noise", "time_left")
+GUARD = ThermalGuard(("gray_mean", "signal_to_noise", "heat_margin"), (0.0, 0.1, 0.4))
+ONE, BATCH = np.zeros(3, np.float32), np.zeros((5, 3), np.float32)
+
+
+@pytest.mark.parametrize(("shots", "action"), [(2, 0), (4, 1), (8, 2)])
+def test_fixed_policy_asks_for_its_shots(shots, action):
+    policy = FixedPolicy(shots)
+    assert policy.act(ONE, {}) == action and isinstance(policy.act(ONE, {}), int)
+    np.testing.assert_array_equal(policy.act(BATCH, {}), np.full(5, action))
+
+
+def test_a_dictionary_observation_has_a_batch_too():
+    images = {"image": np.zeros((5, 3, 60, 80), np.uint8), "state": BATCH}
+    assert FixedPolicy(2).act(images).shape == (5,)
+
+
+def test_random_policy_draws_all_actions_and_repeats_after_reset():
+    policy = RandomPolicy(seed=1)
+    drawn = np.concatenate([policy.act(BATCH) for _ in range(200)])
+    np.testing.assert_allclose(np.bincount(drawn) / drawn.size, 1 / 3, atol=0.05)
+    policy.reset()
+    np.testing.assert_array_equal(policy.act(BATCH), drawn[:5])
+
+
+def test_cycle_starts_with_its_special_frame_and_starts_anew():
+    policy = CyclePolicy(3, shots=8, otherwise=4)
+    assert [policy.act(ONE) for _ in range(7)] == [2, 1, 1, 2, 1, 1, 2]
+    policy.reset()
+    np.testing.assert_array_equal(policy.act(BATCH), np.full(5, 2))
+
+
+def test_threshold_compares_the_named_feature():
+    policy = SnrThresholdPolicy(NAMES, 0.25, below=8, above=2)
+    observation = np.array([[9, 0.2, 9], [-9, 0.25, -9], [0, 0.3, 0]], np.float32)
+    np.testing.assert_array_equal(policy.act(observation), [2, 0, 0])
+    assert policy.act(observation[0]) == 2
+
+
+def test_saved_scheduler_decides_the_same(tmp_path: Path):
+    config = AgentConfig(hidden=(8,))
+    policy = PpoPolicy(build_network(3, config), config, GUARD)
+    policy.save(tmp_path / "agent")
+    loaded = PpoPolicy.load(tmp_path / "agent")
+    observation = np.random.default_rng(0).normal(size=(64, 3)).astype(np.float32) * 10
+    np.testing.assert_array_equal(policy.act(observation), loaded.act(observation))
+    assert loaded.config == config and loaded.feature_names == GUARD.feature_names
+    assert isinstance(loaded.act(observation[0]), int)
+
+
+def test_wrong_arguments_are_named():
+    with pytest.raises(ValueError, match="shots is 3; expected 2, 4 or 8"):
+        FixedPolicy(3)
+    with pytest.raises(ValueError, match="period is 1"):
+        CyclePolicy(1)
+    with pytest.raises(ValueError, match="no 'signal_to_noise'"):
+        SnrThresholdPolicy(("gray_mean",), 0.0, 8, 2)
+
+
+def test_missing_and_damaged_schedulers_are_named(tmp_path: Path):
+    with pytest.raises(ValueError, match=r"agent\.json is missing"):
+        PpoPolicy.load(tmp_path)
+    config = AgentConfig(hidden=(8,))
+    PpoPolicy(build_network(3, config), config, GUARD).save(tmp_path)
+    (tmp_path / "policy.safetensors").write_bytes(b"\x80\x04not tensors")
+    with pytest.raises(ValueError, match=r"policy\.safetensors is not a usable network"):
+        PpoPolicy.load(tmp_path)
+    (tmp_path / "agent.json").write_text(json.dumps({"schema": 99}))
+    with pytest.raises(ValueError, match="schema 99"):
+        PpoPolicy.load(tmp_path)
+    (tmp_path / "agent.json").write_text("{")
+    with pytest.raises(ValueError, match="damaged"):
+        PpoPolicy.load(tmp_path)

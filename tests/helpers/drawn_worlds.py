@@ -1,0 +1,35 @@
+"""Worlds of every family, drawn once for all tests of them."""
+
+from functools import cache
+
+import numpy as np
+
+from shotenv.config.bank import WorldConfig
+from shotenv.config.families import FAMILIES, SHIFT_FAMILIES
+from shotenv.world.draw import draw_world
+from shotenv.world.geometry import materials as m, meshes
+from shotenv.world.geometry.model import Mesh
+
+CLIP = WorldConfig()
+SPARSE = WorldConfig(frames_per_clip=3, frame_rate_hz=1.0)
+EVERY = FAMILIES + SHIFT_FAMILIES
+
+
+@cache
+def drawn_worlds():
+    """Worlds of every family for two kinds of clip: (config, world) pairs."""
+    return [
+        (config, draw_world(family, seed, config))
+        for config in (CLIP, SPARSE)
+        for family in EVERY
+        for seed in range(100, 106 if config is CLIP else 103)
+    ]
+
+
+def numbers(mesh):
+    """Every array of a mesh."""
+    return [value for value in vars(mesh).values() if isinstance(value, np.ndarray)]
+
+
+def a_box(size=(1.0, 1.0, 1.0)) -> Mesh:
+    return meshes.box(size, m.Material(0.2, 0.3))

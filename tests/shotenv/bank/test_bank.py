@@ -1,0 +1,355 @@
+"""The bank: what is written is read back, damage is named, nothing is overwritten."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from collections import Counter
+
+import numpy as np
+import pytest
+import torch
+
+from shotenv.bank import build as build_module
+from shotenv.bank.build import bank_folder as bank_folder_of, build_bank, clip_jobs
+from shotenv.bank.opening import open_bank
+from shotenv.bank.store import (
+    ARRAYS,
+    BankError,
+    frame_bytes,
+    read_clip_record,
+    verify,
+    write_clip,
+    write_manifest,
+)
+from shotenv.config.bank import BankConfig
+from shotenv.config.families import FAMILIES, SHIFT_FAMILIES
+from shotenv.config.reader import ConfigError, find_config, merged, read_config
+
+FRAMES, HEIGHT, WIDTH = 3, 6, 8
+
+
+def clip_arrays(seed: int) -> dict[str, np.ndarray]:
+    random = np.random.default_rng(seed)
+    arrays = {
+        name: random.random((FRAMES, *spec.channels, HEIGHT, WIDTH)).astype(spec.dtype)
+        for name, spec in ARRAYS.items()
+    }
+    arrays["gray"] = random.integers(0, 4096, (FRAMES, HEIGHT, WIDTH)).astype(np.uint16)
+    return arrays
+
+
+def clip_metadata(name: str, seed: int, split: str = "train") -> dict[str, object]:
+    per_frame = [float(number) for number in range(FRAMES)]
+    keys = ("time_s", "ego_speed_m_s", "yaw_rate_rad_s", "gray_exposure_s")
+    return {"name": name, "family": "garage", "seed": seed, "split": split} | dict.fromkeys(
+        keys, per_frame
+    )
+
+
+def write_small_bank(folder, splits):
+    records = [
+        write_clip(folder / "clips" / f"c{i}", clip_arrays(i), clip_metadata(f"c{i}", i, split))
+        for i, split in enumerate(splits)
+    ]
+    write_manifest(folder, "small", records, (HEIGHT, WIDTH))
+    return folder
+
+
+@pytest.fixture
+def bank_folder(tmp_path):
+    return write_small_bank(tmp_path, ("train", "train", "test"))
+
+
+@pytest.fixture
+def shifted_bank(tmp_path):
+    return write_small_bank(tmp_path, ("train", "train", "train", "test", "shift"))
+
+
+def test_what_is_written_is_read_back(bank_folder):
+    bank = open_bank(bank_folder)
+    assert len(bank) == 3 * FRAMES
+    index = FRAMES + 1
+    expected = clip_arrays(1)
+    frame = bank.frame(index)
+    for name in ARRAYS:
+        found = frame.gray if name == "gray" else getattr(frame.exposure, name)[0]
+        np.testing.assert_array_equal(found.numpy(), expected[name][1])
+    assert frame.clip.name == "c1"
+    assert frame.time_s == 1.0
+
+
+def test_a_batch_holds_the_single_frames(bank_folder):
+    bank = open_bank(bank_folder)
+    indices = torch.tensor([5, 0, 8])
+    batch = bank.exposure(indices)
+    for row, index in enumerate(indices.tolist()):
+        single = bank.frame(index).exposure
+        assert torch.equal(batch.correlation[row], single.correlation[0])
+        assert torch.equal(batch.distance_m[row], single.distance_m[0])
+
+
+def test_frame_bytes_is_what_a_frame_takes(bank_folder):
+    sizes = sum(path.stat().st_size for path in (bank_folder / "clips" / "c0").glob("*.npy"))
+    header = 128 * len(ARRAYS)
+    assert sizes == FRAMES * frame_bytes(HEIGHT, WIDTH) + header
+
+
+def test_pickle_opens_the_same_bank(bank_folder):
+    bank = open_bank(bank_folder)
+    again = pickle.loads(pickle.dumps(bank))
+    assert again.fingerprint == bank.fingerprint
+
+
+def test_splits(bank_folder):
+    bank = open_bank(bank_folder)
+    assert [clip.name for clip in bank.splits("test")] == ["c2"]
+    assert len(bank.splits("all")) == 3
+    with pytest.raises(BankError, match=r"'validation', but bank .* only has train, test; choose"):
+        bank.splits("validation")
+
+
+def test_all_leaves_the_shift_split_out(shifted_bank):
+    bank = open_bank(shifted_bank)
+    assert [clip.split for clip in bank.splits("all")] == ["train"] * 3 + ["test"]
+    assert [clip.name for clip in bank.splits("shift")] == ["c4"]
+    assert bank.frames("shift").tolist() == list(range(4 * FRAMES, 5 * FRAMES))
+
+
+def test_a_bank_without_shift_clips_says_so(bank_folder):
+    with pytest.raises(BankError, match=r"'shift', but bank .* only has train, test"):
+        open_bank(bank_folder).splits("shift")
+
+
+def test_frames_by_clip_are_those_of_the_clips(bank_folder):
+    bank = open_bank(bank_folder)
+    assert bank.frames("train").tolist() == list(range(2 * FRAMES))
+    assert bank.frames("test").tolist() == list(range(2 * FRAMES, 3 * FRAMES))
+
+
+def test_frames_by_frame_are_dealt_at_random_without_the_shift(shifted_bank):
+    bank = open_bank(shifted_bank)
+    parts = {name: bank.frames(name, by="frame") for name in ("train", "validation", "test")}
+    assert [len(part) for part in parts.values()] == [10, 1, 1]
+    assert sorted(torch.cat(list(parts.values())).tolist()) == list(range(4 * FRAMES))
+    assert torch.equal(bank.frames("train", by="frame"), parts["train"])
+    assert bank.frames("train", by="frame", seed=1).tolist() != parts["train"].tolist()
+    with pytest.raises(BankError, match="'shift'; by frame"):
+        bank.frames("shift", by="frame")
+
+
+@pytest.mark.parametrize("index", [-1, 9])
+def test_index_outside_is_refused(bank_folder, index):
+    with pytest.raises(IndexError, match=r"expected 0\.\.8"):
+        open_bank(bank_folder).frame(index)
+
+
+def test_writing_to_a_bank_array_leaves_the_file_alone(bank_folder):
+    bank = open_bank(bank_folder)
+    bank.exposure(torch.tensor([0])).active.zero_()
+    assert verify(bank_folder) == ()
+
+
+def test_flipped_bit_is_found_by_verify(bank_folder):
+    path = bank_folder / "clips" / "c1" / "active.npy"
+    content = bytearray(path.read_bytes())
+    content[-1] ^= 1
+    path.write_bytes(content)
+    assert verify(bank_folder) == ("clips/c1/active.npy",)
+
+
+def damage_truncate(folder):
+    path = folder / "clips" / "c0" / "ambient.npy"
+    path.write_bytes(path.read_bytes()[:-8])
+    return "ambient.npy"
+
+
+def damage_missing(folder):
+    (folder / "clips" / "c2" / "gray.npy").unlink()
+    return "gray.npy"
+
+
+def damage_pickle(folder):
+    array = np.array([{"never": "unpickled"}], dtype=object)
+    np.save(folder / "clips" / "c0" / "active.npy", array, allow_pickle=True)
+    return "active.npy"
+
+
+def damage_json(folder):
+    (folder / "manifest.json").write_text('{"schema_version": 1, ')
+    return "manifest.json"
+
+
+def damage_traversal(folder):
+    content = json.loads((folder / "manifest.json").read_text())
+    content["clips"][0]["folder"] = "clips/../../elsewhere"
+    (folder / "manifest.json").write_text(json.dumps(content))
+    return "manifest.json"
+
+
+def damage_schema(folder):
+    content = json.loads((folder / "manifest.json").read_text())
+    content["schema_version"] = 99
+    (folder / "manifest.json").write_text(json.dumps(content))
+    return "schema_version"
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        damage_truncate,
+        damage_missing,
+        damage_pickle,
+        damage_json,
+        damage_traversal,
+        damage_schema,
+    ],
+)
+def test_damaged_bank_is_refused_with_the_file_named(bank_folder, damage):
+    name = damage(bank_folder)
+    with pytest.raises(BankError, match=name):
+        open_bank(bank_folder)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "message"),
+    [
+        ("active", lambda a: a.astype(np.float64), "active is float64"),
+        ("active", lambda a: a[:, :-1], "active is float32"),
+        ("ambient", lambda a: np.where(a > 0.5, np.nan, a), "ambient holds NaN"),
+    ],
+)
+def test_wrong_array_is_refused_and_nothing_is_left(tmp_path, name, change, message):
+    arrays = clip_arrays(0)
+    arrays[name] = change(arrays[name])
+    with pytest.raises(BankError, match=message):
+        write_clip(tmp_path / "clips" / "c", arrays, clip_metadata("c", 0))
+    assert not list(tmp_path.rglob("*.npy"))
+
+
+def test_full_disk_leaves_nothing_behind(tmp_path, monkeypatch):
+    def no_space(descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("shotenv.bank.store.os.fsync", no_space)
+    with pytest.raises(BankError, match="No space left"):
+        write_clip(tmp_path / "clips" / "c", clip_arrays(0), clip_metadata("c", 0))
+    assert not list(tmp_path.rglob("*.npy"))
+
+
+def test_unfinished_clip_has_no_record(tmp_path):
+    assert read_clip_record(tmp_path / "nothing") is None
+
+
+def test_unknown_bank_names_the_known_ones():
+    with pytest.raises(BankError, match="starter"):
+        open_bank("no-such-bank")
+
+
+@pytest.fixture
+def config():
+    starter = read_config(BankConfig, find_config("bank", "starter"))
+    counts = ("train_clips", "validation_clips", "test_clips", "shift_clips")
+    return merged(starter, dict.fromkeys(counts, 1))
+
+
+def test_clip_jobs_cover_every_family_and_split_with_seeds_of_their_own(config, tmp_path):
+    jobs = clip_jobs(config, tmp_path)
+    assert len({job.seed for job in jobs}) == len(jobs) == 15 + len(SHIFT_FAMILIES)
+    assert {(job.split, job.family) for job in jobs} == {
+        (split, family)
+        for split in ("train", "validation", "test")
+        for family in config.world.families
+    } | {("shift", family) for family in SHIFT_FAMILIES}
+
+
+def test_shift_clips_leave_the_other_clips_as_they_were(config, tmp_path):
+    without = clip_jobs(merged(config, {"shift_clips": 0}), tmp_path)
+    kept = clip_jobs(config, tmp_path)[: len(without)]
+    assert [(j.name, j.seed) for j in kept] == [(j.name, j.seed) for j in without]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            dict.fromkeys(("train_clips", "validation_clips", "test_clips", "shift_clips"), 0),
+            "at least one clip",
+        ),
+        ({"shift_clips": -1}, "shift_clips"),
+        ({"shift_clips": 1.5}, "shift_clips"),
+        ({"world": {"families": ["garage", SHIFT_FAMILIES[0]]}}, f"{SHIFT_FAMILIES[0]}, which"),
+        ({"name": "../elsewhere"}, "name"),
+        ({"camera": {"width": 0}}, "camera.width"),
+    ],
+)
+def test_impossible_banks_are_refused(config, change, message):
+    with pytest.raises(ConfigError, match=message):
+        merged(config, change)
+
+
+def test_held_out_families_may_be_trained_on_where_none_is_held_out(config):
+    families = (*FAMILIES, *SHIFT_FAMILIES)
+    opened = merged(config, {"world": {"families": families}, "shift_clips": 0})
+    assert opened.clips["train"] == (1, families)
+
+
+def test_nearfield_is_of_the_papers_size_and_splits_80_10_10():
+    config = read_config(BankConfig, find_config("bank", "nearfield"))
+    jobs = clip_jobs(config, find_config("bank", "nearfield"))
+    frames = Counter(job.split for job in jobs)
+    per_clip = config.world.frames_per_clip
+    assert {split: count * per_clip for split, count in frames.items()} == {
+        "train": 1600,
+        "validation": 200,
+        "test": 200,
+        "shift": 48,
+    }
+    assert len(jobs) * per_clip == 2048
+    assert (config.camera.width, config.camera.height) == (320, 240)
+    assert len(set(Counter(j.family for j in jobs if j.split == "test").values())) == 1
+
+
+def test_shipped_banks_share_no_world():
+    seeds = []
+    for name in ("starter", "training", "nearfield"):
+        bank = read_config(BankConfig, find_config("bank", name))
+        seeds += [job.seed for job in clip_jobs(bank, find_config("bank", name))]
+    assert len(set(seeds)) == len(seeds) >= 2000
+
+
+@pytest.mark.parametrize(
+    ("change", "same"),
+    [
+        ({"sensor": {"integration_s": (1e-4, 2e-4), "offset_std_lsb": 0.0}}, True),
+        ({"sensor": {"gray_target": 0.5}}, False),
+        ({"camera": {"bounces": 3}}, False),
+        ({"seed": 1}, False),
+    ],
+)
+def test_folder_changes_with_what_the_content_depends_on(config, change, same):
+    moved = bank_folder_of(merged(config, change)) != bank_folder_of(config)
+    assert moved is not same
+
+
+def test_no_room_on_the_disk_is_said_before_rendering(config, tmp_path, monkeypatch):
+    usage = type("Usage", (), {"free": 1000})
+    monkeypatch.setattr(build_module.shutil, "disk_usage", lambda folder: usage)
+    with pytest.raises(BankError, match="GB free"):
+        build_bank(config, tmp_path / "bank")
+
+
+def test_folder_of_another_configuration_is_left_alone(config, tmp_path, monkeypatch):
+    monkeypatch.setattr(build_module, "_render", lambda jobs, config, workers: None)
+    with pytest.raises(ValueError, match="clips"):
+        build_bank(config, tmp_path)
+    other = merged(config, {"seed": 7})
+    with pytest.raises(BankError, match="another configuration"):
+        build_bank(other, tmp_path)
+
+
+def test_unwritable_cache_folder_is_named(config, tmp_path):
+    blocker = tmp_path / "file"
+    blocker.write_text("")
+    with pytest.raises(BankError, match="SHOTENV_CACHE"):
+        build_bank(config, blocker / "bank")

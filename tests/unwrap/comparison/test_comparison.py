@@ -1,0 +1,141 @@
+import json
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from shotenv.bank.opening import open_bank
+from shotenv.config.keywords import env_config
+from shotenv.dataset.frames import SensedFrames
+from unwrap.comparison.methods import SCORED_AT_ONCE, Estimate, Method, classical_methods
+from unwrap.comparison.plan import TableConfig, trainings
+from unwrap.comparison.score import accuracy_and_precision, rows_of
+from unwrap.comparison.table import FIGURE, NUMBERS, PAGE, make_table
+from unwrap.depth.correction import unwrapped
+from unwrap.depth.metrics import MIN_DEPTH_M
+from unwrap.signal.shots import Shots
+
+
+@pytest.fixture
+def frames(tiny_bank):
+    bank = open_bank(tiny_bank)
+    return SensedFrames(bank, bank.frames("test"), env_config(bank=tiny_bank), range_m=30.0)
+
+
+def test_a_perfect_method_has_no_error_and_a_blind_one_the_scene_s(frames):
+    _, truth = frames.batch(range(len(frames)), draw=0, shots=None)
+    scored = frames.scored(range(len(frames)), draw=0)
+    places = iter([*range(len(frames)), *range(len(frames))])
+
+    def perfect(sensed, sensor):
+        return Estimate(truth.distance_m[[next(places)]], torch.ones_like(sensed.gray))
+
+    def blind(sensed, sensor):
+        return Estimate(torch.full_like(sensed.gray, torch.nan))
+
+    methods = [
+        Method("perfect", "none", (Shots.TWO, Shots.FOUR), perfect),
+        Method("blind", "none", (Shots.TWO,), blind),
+    ]
+    rows = {(row["method"], row["shots"]): row for row in rows_of(methods, frames)}
+    assert set(rows) == {("perfect", 2), ("perfect", 4), ("blind", 2)}
+    best = rows["perfect", 2]
+    assert best["mae_m"] == best["calibration_error"] == 0
+    assert best["wrap_accuracy"] == best["class_accuracy"] == 1
+    assert best["accuracy_percent"] == best["precision_percent"] == 100
+    means = [truth.distance_m[i][scored[i]].double().mean() for i in range(len(frames))]
+    # Depths are raised to MIN_DEPTH_M.
+    expected_m = float(torch.stack(means).mean()) - MIN_DEPTH_M
+    assert rows["blind", 2]["mae_m"] == pytest.approx(expected_m, abs=1e-5)
+    assert "calibration_error" not in rows["blind", 2]
+
+
+def test_frames_looked_at_together_score_as_one_by_one(frames, monkeypatch):
+    def look(sensed, sensor):
+        depth_m = unwrapped(sensed, 12 * sensed.gray, sensor).distance_m
+        if sensed.memory is not None:
+            depth_m = torch.where(sensed.memory.known > 0, sensed.memory.distance_m, depth_m)
+        return Estimate(depth_m, sensed.gray)
+
+    methods = [Method(f"{i}", "none", (Shots.FOUR,), look, remembers=i > 0) for i in range(2)]
+    alone = rows_of(methods, frames)
+    monkeypatch.setitem(SCORED_AT_ONCE, "cpu", 3)
+    assert rows_of(methods, frames) == alone
+
+
+def test_what_remembers_gets_its_own_trusted_depth_moved(frames):
+    shown = []
+
+    def look(sensed, sensor):
+        shown.append(sensed.memory)
+        confidence = torch.ones_like(sensed.gray)
+        confidence[:, :, :16] = 0.2
+        return Estimate(torch.full_like(sensed.gray, 10.0), confidence)
+
+    rows_of([Method("m", "none", (Shots.FOUR,), look, remembers=True)], frames)
+    first = [number for number in range(len(frames)) if not frames.follows(number)]
+    assert [i for i, memory in enumerate(shown) if memory is None] == first
+    memory = shown[1]
+    known = memory.known[0] > 0
+    assert known[:, 20:].float().mean() > 0.5
+    assert known[:, :10].float().mean() < 0.2
+    assert (memory.distance_m[0][known] <= 10.0 + 1e-3).all()
+
+
+def test_accuracy_and_precision_of_known_errors():
+    truth_m = torch.full((1, 2, 2), 10.0)
+    depth_m = truth_m + torch.tensor([[1.0, 1.0], [3.0, 3.0]])
+    found = accuracy_and_precision(depth_m, truth_m, torch.ones(1, 2, 2).bool(), 20.0)
+    assert found == pytest.approx({"accuracy_percent": 90.0, "precision_percent": 95.0})
+
+
+def test_the_paper_s_networks_are_trained_on_both_splits_and_truths():
+    planned = list(trainings(TableConfig()))
+    papers = {
+        (t.config.network, t.config.split_by, t.config.truth)
+        for t in planned
+        if t.recipe == "paper"
+    }
+    assert len(papers) == 8
+    assert len({t.folder for t in planned}) == len(planned) == 8 + 1 + 4 + 1
+    budgets = {(t.config.epochs, t.config.batch_size, t.config.width) for t in planned}
+    assert len(budgets) == 1
+
+
+@pytest.mark.slow
+def test_the_table_is_made_once_and_goes_on_where_it_stopped(tiny_bank, tmp_path, monkeypatch):
+    networks = ("tofregnet", "tofsegnet", "phasenet", "toffusionnet")
+    config = TableConfig(bank=tiny_bank, width=4, epochs=1, batch_size=8, networks=networks)
+    assert make_table(config, tmp_path, only=["tofsegnet"]) == []
+    assert not (tmp_path / PAGE).exists()
+    rows = make_table(config, tmp_path)
+    assert json.loads((tmp_path / NUMBERS).read_text())["rows"] == rows
+    keys = {(row["method"], row["shots"], row["merge"], row["split"], row["truth"]) for row in rows}
+    assert len(keys) == len(rows)
+    assert {row["split"] for row in rows} == {"clip", "frame"}
+    assert {row["truth"] for row in rows} == {"rendered", "measured"}
+    assert all(np.isfinite(row["mae_m"]) and 0 <= row["wrap_accuracy"] <= 1 for row in rows)
+    page = (tmp_path / PAGE).read_text()
+    assert all(row["method"] in page for row in rows)
+    with Image.open(tmp_path / FIGURE) as picture:
+        assert picture.width > 300
+
+    def never(*_, **__):
+        raise AssertionError("trained again")
+
+    monkeypatch.setattr("unwrap.comparison.plan.train", never)
+    assert make_table(config, tmp_path) == rows
+
+
+def test_an_unknown_network_is_named(tmp_path):
+    with pytest.raises(ValueError, match="unet"):
+        make_table(TableConfig(), tmp_path, only=["unet"])
+
+
+def test_two_frequencies_are_judged_without_rejection(frames):
+    sensed, _ = frames.batch([0], draw=0, shots=Shots.EIGHT)
+    assert unwrapped(sensed, None, frames.sensor).distance_m.isnan().any()
+    (method,) = (m for m in classical_methods(frames) if m.label.startswith("two frequencies"))
+    depth_m = method.look(sensed, frames.sensor).depth_m
+    assert torch.equal(depth_m.isnan(), sensed.raw.saturated)

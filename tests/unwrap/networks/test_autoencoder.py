@@ -1,0 +1,138 @@
+import os
+import subprocess
+import sys
+
+import pytest
+import torch
+from torch import nn
+
+from unwrap.networks.autoencoder import STRIDE, class_depth_m, convolution, pad
+from unwrap.networks.base import Settings, multiply_accumulates
+from unwrap.networks.registry import NAMES, build
+from unwrap.networks.tofregnet import TofRegNet
+from unwrap.networks.tofsegnet import TofSegNet
+
+
+@pytest.mark.parametrize(("height", "width"), [(32, 64), (45, 61), (33, 32), (5, 100)])
+def test_output_has_the_input_s_resolution(height, width):
+    gray = torch.rand(2, 1, height, width)
+    assert TofRegNet(4)(gray).shape == (2, height, width)
+    assert TofSegNet(4, classes=3)(gray).shape == (2, 3, height, width)
+
+
+def test_depth_is_positive_and_within_the_range():
+    depth = TofRegNet(4, range_m=12.0)(torch.rand(2, 1, 32, 32))
+    assert depth.dtype == torch.float32
+    assert 0 < depth.min() <= depth.max() < 12
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0])
+def test_black_and_white_images_give_finite_depth(level):
+    assert TofRegNet(4).eval()(torch.full((1, 1, 32, 32), level)).isfinite().all()
+
+
+def test_body_is_a_resnet18_autoencoder():
+    network = TofRegNet(64)
+    blocks = [module for stage in network.encoder for module in stage]
+    assert len(network.encoder) == 4
+    assert len(blocks) == 8
+    transposed = [m for m in network.up.modules() if isinstance(m, nn.ConvTranspose2d)]
+    plain = [m for m in network.plain.modules() if isinstance(m, nn.Conv2d)]
+    assert len(transposed) == len(plain) == 4
+    # Four stages of the published ResNet18 without its stem and classifier.
+    assert sum(p.numel() for p in network.encoder.parameters()) == 11_166_976
+
+
+def test_networks_differ_only_in_the_head():
+    names = {name for name, _ in TofRegNet(4).named_parameters()}
+    assert names == {name for name, _ in TofSegNet(4).named_parameters()}
+
+
+def test_padding_repeats_the_border():
+    gray = torch.rand(1, 1, 30, 33)
+    padded = pad(gray)
+    assert padded.shape == (1, 1, STRIDE, 2 * STRIDE)
+    assert torch.equal(padded[..., :30, :33], gray)
+    assert torch.equal(padded[..., :30, -1], gray[..., -1])
+
+
+def test_every_parameter_gets_a_gradient():
+    network = TofSegNet(4)
+    network(torch.rand(2, 1, 64, 64)).square().mean().backward()
+    dead = [name for name, p in network.named_parameters() if not p.grad.abs().sum() > 0]
+    assert dead == []
+
+
+TRAINING = """
+import torch
+from unwrap.networks import TofRegNet
+torch.manual_seed(0)
+torch.set_num_threads(1)
+network = TofRegNet(4).to(memory_format=torch.channels_last)
+optimizer = torch.optim.SGD(network.parameters(), 1e-3)
+for _ in range(30):
+    optimizer.zero_grad()
+    network(torch.rand(2, 1, 64, 64)).mean().backward()
+    optimizer.step()
+"""
+
+
+def test_training_of_a_narrow_network_leaves_the_heap_in_order():
+    # glibc's checking allocator aborts the process at the first spoilt block. Elsewhere the two
+    # variables do nothing, but a spoilt heap seldom lasts thirty steps.
+    checks = {"LD_PRELOAD": "libc_malloc_debug.so.0", "MALLOC_CHECK_": "3"}
+    done = subprocess.run(
+        [sys.executable, "-c", TRAINING],
+        env={**os.environ, **checks},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_kernel_of_one_pixel_is_strided(name):
+    # See `unwrap.networks.autoencoder.BasicBlock.forward`.
+    convolutions = [m for m in build(name, Settings(width=4)).modules() if isinstance(m, nn.Conv2d)]
+    assert convolutions
+    assert all(m.kernel_size != (1, 1) or m.stride == (1, 1) for m in convolutions)
+
+
+@pytest.mark.parametrize(
+    ("metadata", "message"),
+    [
+        ({"network": "resnet", "width": 4}, "network"),
+        ({"network": "tofregnet", "width": 1_000_000, "range_m": 30}, "width"),
+        ({"network": "tofregnet", "width": "4", "range_m": 30}, "width"),
+        ({"network": "tofsegnet", "width": 4, "classes": 10**9}, "classes"),
+    ],
+)
+def test_build_refuses_impossible_networks(metadata, message):
+    with pytest.raises(ValueError, match=message):
+        build(metadata["network"], Settings.of(metadata))
+
+
+def test_multiply_accumulates_of_known_layers():
+    layers = nn.Sequential(nn.Conv2d(1, 6, 3, 2, 1), nn.ConvTranspose2d(6, 5, 2, stride=2))
+    convolved, transposed = 8 * 10 * 6 * 9, 8 * 10 * 6 * 5 * 4
+    assert multiply_accumulates(layers, torch.zeros(1, 1, 16, 20)) == convolved + transposed
+    assert multiply_accumulates(convolution(1, 2), torch.zeros(1, 1, 4, 4)) == 16 * 2 * 9
+
+
+@pytest.mark.parametrize(
+    ("probability", "expected"),
+    [
+        ([1.0, 0.0, 0.0], 0.5),  # certain: the middle of the class
+        ([0.5, 0.5, 0.0], 1.0),  # between two: their boundary
+        ([0.2, 0.7, 0.1], 1.4),
+        ([0.6, 0.0, 0.4], 1.0),  # kept within the likeliest class
+        ([0.25, 0.25, 0.5], 2.0),
+    ],
+)
+def test_class_depth_is_the_expectation_within_the_likeliest_class(probability, expected):
+    logits = torch.tensor(probability).clamp(min=1e-12).log()[None, :, None, None]
+    depth = class_depth_m(logits + 3.0, unambiguous_m=6.25)
+    assert depth.shape == (1, 1, 1)
+    assert depth.item() == pytest.approx(6.25 * expected, abs=1e-4)

@@ -1,0 +1,264 @@
+import pickle
+import subprocess
+import sys
+
+import pytest
+import torch
+from raw_frames import RANGE_M, SENSOR, raw_frame
+from safetensors import safe_open
+from safetensors.torch import load_file, save_file
+
+from unwrap.depth.correction import correct
+from unwrap.networks.predictor import FRAMES_AT_ONCE, SHIPPED, load_unwrapper
+from unwrap.networks.tofregnet import TofRegNet
+from unwrap.networks.tofsegnet import TofSegNet
+from unwrap.networks.weight_files import save_weights
+from unwrap.signal.frames import RawFrame
+from unwrap.signal.frequencies import unambiguous_range_m
+
+
+def metadata(name, **changes):
+    base = {"network": name, "width": 4, "classes": 5, "range_m": 30.0, "f1_hz": 24e6}
+    return base | {"bank": "none", "config": {}} | changes
+
+
+@pytest.fixture(params=["tofregnet", "tofsegnet"])
+def path(request, tmp_path):
+    torch.manual_seed(0)
+    network = TofRegNet(4) if request.param == "tofregnet" else TofSegNet(4)
+    path = tmp_path / f"{request.param}.safetensors"
+    save_weights(path, network, metadata(request.param))
+    return path
+
+
+@pytest.fixture
+def truth():
+    return torch.linspace(0.05, 24.95, 2 * 20 * 30, dtype=torch.float64).reshape(2, 20, 30)
+
+
+@pytest.mark.parametrize("name", ["tofregnet", "tofsegnet", "toffusionnet"])
+def test_shipped_networks_are_small_and_say_what_they_are(name):
+    unwrapper = load_unwrapper(name)
+    assert unwrapper.name == name
+    assert (SHIPPED / f"{name}.safetensors").stat().st_size <= 8e6
+    assert unwrapper.metadata["f1_hz"] == 24e6
+
+
+def test_prediction_is_that_of_the_network(path):
+    unwrapper = load_unwrapper(path)
+    gray = torch.rand(3, 40, 50)
+    prediction = unwrapper.predict(gray)
+    assert prediction.distance_m.shape == prediction.confidence.shape == gray.shape
+    assert prediction.distance_m.dtype == torch.float32
+    assert 0 <= prediction.confidence.min() <= prediction.confidence.max() <= 1
+    with torch.inference_mode():
+        output = unwrapper.network(gray[:, None])
+    if unwrapper.name == "tofregnet":
+        assert (prediction.distance_m - output).abs().mean() < 0.1
+    else:
+        likeliest = (prediction.distance_m / RANGE_M).long()
+        assert (likeliest == output.argmax(1)).float().mean() > 0.95
+
+
+def test_prediction_does_not_depend_on_the_batch(path):
+    unwrapper = load_unwrapper(path)
+    gray = torch.rand(3, 32, 32)
+    together = unwrapper.predict(gray).distance_m
+    alone = torch.cat([unwrapper.predict(image[None]).distance_m for image in gray])
+    assert torch.equal(together, alone)
+
+
+def test_many_frames_at_once_give_what_one_by_one_gives(path, monkeypatch):
+    unwrapper, gray = load_unwrapper(path), torch.rand(5, 64, 96)
+    alone = unwrapper.predict(gray)
+    monkeypatch.setitem(FRAMES_AT_ONCE, "cpu", 2)
+    at_once = unwrapper.predict(gray)
+    assert at_once.distance_m.shape == at_once.confidence.shape == gray.shape
+    # Arithmetic in bfloat16 may round another way; an untrained class may then be another.
+    assert ((at_once.distance_m - alone.distance_m).abs() < 0.1).float().mean() > 0.95
+
+
+def test_words_and_fractions_give_the_same(path):
+    unwrapper = load_unwrapper(path)
+    words = torch.randint(0, 4096, (1, 32, 32)).to(torch.uint16)
+    fractions = words.float() / 4095
+    assert torch.equal(unwrapper.predict(words).distance_m, unwrapper.predict(fractions).distance_m)
+
+
+@pytest.mark.parametrize(
+    "gray",
+    [
+        torch.zeros(8, 8),
+        torch.zeros(0, 8, 8),
+        torch.zeros(1, 8, 8).int(),
+        torch.full((1, 8, 8), 2.0),
+        torch.full((1, 8, 8), -0.1),
+        torch.full((1, 8, 8), torch.nan),
+        torch.full((1, 8, 8), 5000).to(torch.uint16),
+    ],
+)
+def test_predict_refuses_other_images(path, gray):
+    with pytest.raises(ValueError, match="gray"):
+        load_unwrapper(path).predict(gray)
+
+
+def test_macs_of_the_stem_and_growth_with_the_image(path):
+    unwrapper = load_unwrapper(path)
+    assert unwrapper.macs(64, 64) == 4 * unwrapper.macs(32, 32)
+    assert unwrapper.macs(33, 32) == unwrapper.macs(64, 32)
+    assert unwrapper.macs(32, 32) > 16 * 16 * 3 * 49 * 4
+
+
+def test_fingerprint_follows_the_weights(path):
+    one = load_unwrapper(path)
+    assert load_unwrapper(path).fingerprint == one.fingerprint
+    with torch.no_grad():
+        one.network.head.bias.add_(1)
+    save_weights(path, one.network, metadata(one.name))
+    assert load_unwrapper(path).fingerprint != one.fingerprint
+
+
+def test_missing_file_is_named(tmp_path):
+    with pytest.raises(ValueError, match=r"absent\.safetensors.*no such file"):
+        load_unwrapper(tmp_path / "absent.safetensors")
+
+
+class Canary:
+    def __reduce__(self):
+        return exec, ("raise SystemExit('unpickled')",)
+
+
+@pytest.mark.parametrize("damage", ["empty", "truncated", "flipped", "pickled", "torch", "header"])
+def test_damaged_file_is_named_and_never_unpickled(path, damage):
+    content = bytearray(path.read_bytes())
+    if damage == "flipped":
+        content[-100] ^= 1
+    elif damage == "header":
+        content[:8] = (2**60).to_bytes(8, "little")
+    replaced = {
+        "empty": b"",
+        "truncated": bytes(content[:-50]),
+        "pickled": pickle.dumps(Canary()),
+    }
+    path.write_bytes(replaced.get(damage, bytes(content)))
+    if damage == "torch":
+        torch.save({"weights": torch.zeros(3)}, path)
+    with pytest.raises(ValueError, match=rf"{path.name}: unusable network file .*train it again"):
+        load_unwrapper(path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"width": "8"},
+        {"width": "10000000"},
+        {"network": "other"},
+        {"schema": "99"},
+        {"sha256": "0"},
+    ],
+)
+def test_metadata_that_does_not_fit_is_refused(path, change):
+    with safe_open(path, framework="pt") as file:
+        words = file.metadata() | change
+    save_file(load_file(path), path, words)
+    with pytest.raises(ValueError, match=path.name):
+        load_unwrapper(path)
+
+
+def test_safetensors_of_something_else_is_refused(tmp_path):
+    save_file({"a": torch.zeros(2)}, tmp_path / "a.safetensors")
+    with pytest.raises(ValueError, match=r"a\.safetensors.*schema"):
+        load_unwrapper(tmp_path / "a.safetensors")
+
+
+@pytest.mark.parametrize("merge", ["nearest", "floor"])
+@pytest.mark.parametrize("count", [2, 4])
+def test_few_samples_and_a_perfect_prediction_give_the_truth(truth, count, merge):
+    frame = correct(raw_frame(truth, count), truth.float(), SENSOR, merge=merge)
+    away = (truth % RANGE_M - RANGE_M / 2).abs() < RANGE_M / 2 - 0.06
+    torch.testing.assert_close(frame.distance_m[away], truth[away].float(), rtol=0, atol=1e-3)
+    assert torch.equal(frame.wraps[away], (truth[away] / RANGE_M).long())
+    assert frame.valid.all()
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_unmerged_the_prediction_stands_and_is_not_written_to(truth, count):
+    raw, predicted_m = raw_frame(truth, count), truth.float() + 0.3
+    before = predicted_m.clone()
+    frame = correct(raw, predicted_m, SENSOR, merge="none")
+    assert torch.equal(frame.distance_m, before)
+    assert frame.valid.all()
+    eight = correct(raw_frame(truth, 8), predicted_m, SENSOR, merge="none")
+    torch.testing.assert_close(eight.distance_m, truth.float(), rtol=0, atol=1e-3)
+    assert torch.equal(predicted_m, before)
+
+
+def test_eight_samples_need_no_prediction(truth):
+    frame = correct(raw_frame(truth, 8), None, SENSOR)
+    torch.testing.assert_close(frame.distance_m, truth.float(), rtol=0, atol=1e-3)
+    assert frame.valid.all()
+
+
+def test_invalid_pixels_hold_the_prediction_or_nan(truth):
+    raw = raw_frame(truth, 8)
+    raw.saturated[0, 0, 0] = True
+    raw.dcs_lsb[0, :, 0, 1] *= 0.001
+    guessed = correct(raw, torch.full(truth.shape, 9.0), SENSOR)
+    assert guessed.valid.sum() == truth.numel() - 2
+    assert guessed.distance_m[0, 0, :2].tolist() == [9.0] * 2
+    assert guessed.wraps[0, 0, :2].tolist() == [1] * 2
+    unknown = correct(raw, None, SENSOR)
+    assert unknown.distance_m[0, 0, :2].isnan().all()
+    assert torch.equal(unknown.valid, guessed.valid)
+
+
+def test_where_the_frequencies_disagree_the_prediction_decides(truth):
+    raw = raw_frame(truth, 8)
+    raw.dcs_lsb[0, 4:, 0, 2] = raw_frame(truth + 1.2, 8).dcs_lsb[0, 4:, 0, 2]
+    unambiguous = unambiguous_range_m(SENSOR.f1_hz)
+    second_wrap = truth.float() + unambiguous
+    frame = correct(raw, second_wrap, SENSOR)
+    expected = truth[0, 0, 2].item() + unambiguous
+    assert frame.distance_m[0, 0, 2].item() == pytest.approx(expected, abs=1e-3)
+    assert frame.valid.all()
+    others = torch.ones_like(truth, dtype=torch.bool)
+    others[0, 0, 2] = False
+    torch.testing.assert_close(frame.distance_m[others], truth.float()[others], rtol=0, atol=1e-3)
+    alone = correct(raw, None, SENSOR)
+    assert not alone.valid[0, 0, 2] and alone.valid[others].all()
+
+
+def test_noise_map_decides_what_is_valid(truth):
+    noise = torch.where(truth < 10, 100.0, 300.0)
+    frame = correct(raw_frame(truth, 4), truth.float(), SENSOR, noise_lsb=noise)
+    assert torch.equal(frame.valid, truth < 10)
+
+
+def test_offset_map_is_subtracted(truth):
+    offset = torch.linspace(-50, 50, 20 * 30).reshape(20, 30)
+    raw = raw_frame(truth, 2)
+    shifted = RawFrame(raw.dcs_lsb + offset, raw.saturated)
+    frame = correct(shifted, truth.float(), SENSOR, offset_lsb=offset)
+    expected = correct(raw, truth.float(), SENSOR)
+    torch.testing.assert_close(frame.distance_m, expected.distance_m, rtol=0, atol=1e-3)
+
+
+def test_correct_refuses_what_it_cannot_do(truth):
+    with pytest.raises(ValueError, match="predicted_m is None"):
+        correct(raw_frame(truth, 4), None, SENSOR)
+    with pytest.raises(ValueError, match="merge is 'ceil'"):
+        correct(raw_frame(truth, 4), truth, SENSOR, merge="ceil")
+
+
+def test_import_is_light():
+    code = "import sys, unwrap; assert not {'torch', 'numpy'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_public_names():
+    import unwrap
+
+    assert callable(unwrap.load_unwrapper)
+    assert callable(unwrap.correct)
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = unwrap.nothing

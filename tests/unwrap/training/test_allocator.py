@@ -1,0 +1,42 @@
+"""Memory that tensors gave back is there for the next ones."""
+
+import subprocess
+import sys
+
+import pytest
+
+from unwrap.training.allocator import keep_freed_memory
+
+PAGES = """
+import resource, sys
+import torch
+from unwrap.training.allocator import keep_freed_memory
+if sys.argv[1] == "keep":
+    keep_freed_memory()
+def use():
+    torch.ones(32 << 20, dtype=torch.uint8)
+for _ in range(30):  # Small allocations come to lie between the first ones.
+    use()
+before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+for _ in range(10):
+    use()
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+"""
+
+
+def pages_mapped(how: str) -> int:
+    """Pages that ten more tensors of 32 MiB make a process map."""
+    command = [sys.executable, "-c", PAGES, how]
+    return int(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks the GNU C library")
+def test_freed_memory_is_used_again():
+    if pages_mapped("leave") < 1000:
+        pytest.skip("this C library keeps freed memory by itself")
+    assert pages_mapped("keep") < 100
+
+
+def test_other_systems_are_left_alone(monkeypatch):
+    monkeypatch.setattr(sys, "platform", "darwin")
+    assert not keep_freed_memory()

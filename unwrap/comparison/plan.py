@@ -1,0 +1,122 @@
+"""The results table: which networks are trained for it, and the training of each."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from shotenv.dataset import sources
+from unwrap.networks import NetworkName, Unwrapper, load_unwrapper
+from unwrap.support import Positive, Section, say
+from unwrap.training import TrainConfig, train
+
+PAPERS: tuple[NetworkName, ...] = ("tofregnet", "tofsegnet")
+PEERS: tuple[NetworkName, ...] = ("su_net", "phasenet", "agresti_net", "chen_net")
+RecipeName = Literal["paper", "ours"]
+
+
+class TableConfig(Section):
+    """What every network of the table is trained on, and for how long: the same for all."""
+
+    bank: str = Field("nearfield", description="name or path of the bank")
+    sensor: str = Field("epc660", description="name or path of the sensor that looks at it")
+    stride: int = Field(1, ge=1, le=8, description="every how many rows and columns are used")
+    width: int = Field(64, ge=4, le=128, description="channels of the networks' first stage")
+    epochs: int = Field(150, ge=1, description="passes over the training frames")
+    batch_size: int = Field(32, ge=1, description="frames per step")
+    learning_rate: Positive = Field(3e-3, description="highest learning rate, one rise and fall")
+    networks: tuple[NetworkName, ...] = Field(
+        (*PAPERS, *PEERS, "toffusionnet"), description="networks that are trained and judged"
+    )
+    seed: int = Field(0, ge=0, description="seed of weights, order and augmentation")
+
+
+@dataclass(frozen=True)
+class Training:
+    """One trained network of the table.
+
+    Attributes
+    ----------
+    label : str
+        As rows name it.
+    recipe : "paper" or "ours"
+        Losses and flips as published, or ours; see `RECIPES`.
+    config : TrainConfig
+    """
+
+    label: str
+    recipe: RecipeName
+    config: TrainConfig
+
+    @property
+    def folder(self) -> str:
+        """Its place below the folder of the table."""
+        config = self.config
+        return f"{config.network}-{self.recipe}-{config.split_by}-{config.truth}"
+
+
+RECIPES: dict[RecipeName, dict[str, Any]] = {
+    "paper": {"equation_7_mean_share": 1.0, "wrap_weight": 0.0, "flip_vertical": True},
+    "ours": {"clip_norm": 1.0},
+}
+LABELS: dict[str, str] = {
+    "tofregnet": "TofRegNet",
+    "tofsegnet": "TofSegNet",
+    "toffusionnet": "TofFusionNet (ours)",
+    "su_net": "end to end (Su et al. 2018)",
+    "phasenet": "PhaseNet (Spoorthi et al. 2019)",
+    "agresti_net": "light network (Agresti et al.)",
+    "chen_net": "denoiser (Chen et al. 2020)",
+}
+
+
+def trainings(config: TableConfig) -> Iterator[Training]:
+    """The paper's networks on both splits and both truths, the others on clips and rendered truth.
+
+    TofRegNet also with our loss, which is what the shipped weights are trained with.
+    """
+    for network in config.networks:
+        if network not in PAPERS:
+            yield _training(config, network, "ours")
+            continue
+        for split_by in ("clip", "frame"):
+            for truth in ("rendered", "measured"):
+                yield _training(config, network, "paper", split_by=split_by, truth=truth)
+        if network == "tofregnet":
+            yield _training(config, network, "ours")
+
+
+def _training(
+    config: TableConfig, network: NetworkName, recipe: RecipeName, **fields: Any
+) -> Training:
+    shared = ("bank", "sensor", "stride", "width", "epochs", "batch_size", "learning_rate", "seed")
+    values = {name: getattr(config, name) for name in shared} | RECIPES[recipe] | fields
+    memory = network == "toffusionnet"
+    ours = " with our loss" if network in PAPERS and recipe == "ours" else ""
+    train_config = TrainConfig(network=network, memory=memory, **values)
+    return Training(LABELS[network] + ours, recipe, train_config)
+
+
+def trained(training: Training, out: Path) -> Unwrapper:
+    """The network, trained now unless it stands in `out` already."""
+    config, folder = training.config, out / training.folder
+    path = folder / f"{config.network}.safetensors"
+    if not _stands(path, config):
+        say(f"training {training.label}, split by {config.split_by}, {config.truth} truth")
+        train(config, sources(config), folder)
+    return load_unwrapper(path)
+
+
+def _stands(path: Path, config: TrainConfig) -> bool:
+    """Whether the weights at `path` were trained as `config` says, to the end."""
+    numbers = path.with_suffix(".json")
+    if not (path.is_file() and numbers.is_file()):
+        return False
+    return json.loads(numbers.read_text(encoding="utf-8"))["config"] == config.model_dump(
+        mode="json"
+    )

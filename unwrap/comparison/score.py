@@ -1,0 +1,150 @@
+"""TODO."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from operator import itemgetter
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from shotenv.dataset import SensedFrames
+from unwrap.comparison.methods import (
+    CPU,
+    SCORED_AT_ONCE,
+    TRUSTED,
+    Estimate,
+    Method,
+)
+from unwrap.depth import expected_calibration_error, score
+from unwrap.signal import Memory, Sensed, Shots, unambiguous_range_m
+from unwrap.support import mapped, on_device
+from unwrap.training import JUDGED_DRAW, acquiring_threads, in_order, loader
+
+
+@torch.inference_mode()
+def rows_of(
+    methods: Sequence[Method],
+    frames: SensedFrames,
+    *,
+    device: torch.device = CPU,
+    tick: Callable[[int], object] = lambda frames: None,
+) -> list[dict[str, Any]]:
+    """A row for each method and number of samples: means over all frames.
+
+    The frames come in their order, so that a method which remembers has seen the frame before.
+    `device` is where the networks are; `tick` is told of the frames scored, once for each number
+    of samples.
+    """
+    tallies = {
+        (method, shots): _Tally(method, frames)
+        for method in methods
+        for shots in Shots
+        if shots in method.shots
+    }
+    for shots in dict.fromkeys(shots for _, shots in tallies):
+        of_shots = [tally for (_, its), tally in tallies.items() if its == shots]
+        orders = in_order(frames, SCORED_AT_ONCE[device.type], (shots,), draw=JUDGED_DRAW)
+        batches = loader(frames, orders, threads=acquiring_threads(device))
+        for order, batch in zip(orders, batches, strict=True):
+            sensed, truth = on_device(batch, device)
+            scored = frames.scored(order.numbers, draw=JUDGED_DRAW).to(device) & truth.known
+            for tally in of_shots:
+                tally.judge(sensed, order.numbers, truth.distance_m, scored)
+            tick(len(sensed))
+    return [
+        {"method": method.label, "shots": int(shots), "merge": method.merge, **tally.means()}
+        for (method, shots), tally in tallies.items()
+    ]
+
+
+class _Tally:
+    """What one method made of the frames so far."""
+
+    def __init__(self, method: Method, frames: SensedFrames):
+        self._method, self._frames = method, frames
+        self._unambiguous_m = unambiguous_range_m(frames.sensor.f1_hz)
+        self._scores: list[dict[str, float]] = []
+        self._confidence: list[Tensor] = []
+        self._right: list[Tensor] = []
+        self._last: Estimate | None = None
+        self._confusion = torch.zeros(CLASSES, CLASSES, dtype=torch.int64)
+
+    def judge(
+        self, sensed: Sensed, numbers: Sequence[int], truth_m: Tensor, scored: Tensor
+    ) -> None:
+        """Let the method look at frames [B], all at once unless it remembers, and score them."""
+        places = [slice(place, place + 1) for place in range(len(numbers))]
+        if self._method.remembers:
+            for place, number in zip(places, numbers, strict=True):
+                shown = replace(mapped(itemgetter(place), sensed), memory=self._memory(number))
+                self._last = self._method.look(shown, self._frames.sensor)
+                self._add(self._last, truth_m[place], scored[place])
+            return
+        shown = sensed if sensed.memory is None else replace(sensed, memory=None)
+        estimate = self._method.look(shown, self._frames.sensor)
+        for place in places:
+            self._add(mapped(itemgetter(place), estimate), truth_m[place], scored[place])
+
+    def _memory(self, number: int) -> Memory | None:
+        """What the method remembers of the frame before; nothing at the start of a clip."""
+        last = self._last
+        if last is None or not self._frames.follows(number):
+            return None
+        trusted = torch.ones_like(last.depth_m) if last.confidence is None else last.confidence
+        seen_m = last.depth_m.masked_fill(trusted < TRUSTED, torch.nan)
+        return on_device(self._frames.moved(seen_m.cpu(), [number]), seen_m.device)
+
+    def _add(self, estimate: Estimate, truth_m: Tensor, scored: Tensor) -> None:
+        """Score one frame [1, H, W]; depth that is missing counts as 0."""
+        depth_m = estimate.depth_m.nan_to_num(0.0)
+        range_m = self._frames.sensor.max_range_m
+        half_m = self._unambiguous_m / 2
+        self._scores.append(
+            score(depth_m, truth_m, scored, half_m)
+            | accuracy_and_precision(depth_m, truth_m, scored, range_m)
+        )
+        true, found = (self._classes(map_m[scored]) for map_m in (truth_m, depth_m))
+        counts = torch.bincount(true * CLASSES + found, minlength=CLASSES**2)
+        self._confusion += counts.view(CLASSES, CLASSES).cpu()
+        if estimate.confidence is not None:
+            self._confidence.append(estimate.confidence[scored].clamp(0, 1).half())
+            self._right.append(((depth_m - truth_m).abs() < half_m)[scored])
+
+    def _classes(self, distance_m: Tensor) -> Tensor:
+        return (distance_m / self._unambiguous_m).long().clamp(0, CLASSES - 1)
+
+    def means(self) -> dict[str, float]:
+        """Mean of each number over the frames that have it, and what is counted over all pixels."""
+        means = {"frames": float(len(self._scores))}
+        for name in self._scores[0]:
+            values = [one[name] for one in self._scores if not math.isnan(one[name])]
+            means[name] = sum(values) / len(values) if values else math.nan
+        right = self._confusion.diagonal().double()
+        found = self._confusion.sum(0)
+        means["class_accuracy"] = float(right.sum() / self._confusion.sum())
+        means["class_precision"] = float((right / found)[found > 0].mean())
+        if self._confidence:
+            confidence, right = torch.cat(self._confidence), torch.cat(self._right)
+            means["calibration_error"] = expected_calibration_error(confidence.float(), right)
+        return means
+
+
+CLASSES = 5
+"""Wrap classes up to 25 m, and all beyond."""
+
+
+def accuracy_and_precision(
+    depth_m: Tensor, truth_m: Tensor, scored: Tensor, range_m: float
+) -> dict[str, float]:
+    """Ours, as the paper defines neither: 100 (1 - mean |e| / range), 100 (1 - std e / range)."""
+    error = (depth_m - truth_m)[scored].double()
+    if not len(error):
+        return {"accuracy_percent": math.nan, "precision_percent": math.nan}
+    return {
+        "accuracy_percent": 100 * (1 - float(error.abs().mean()) / range_m),
+        "precision_percent": 100 * (1 - float(error.std(correction=0)) / range_m),
+    }

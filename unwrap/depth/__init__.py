@@ -1,0 +1,5 @@
+"""Phase to distance: two frequencies, merge rules, correction, classical methods, metrics."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,25 @@
+from .amplitude import unwrap_amplitude as unwrap_amplitude
+from .confidence import (
+    expected_calibration_error as expected_calibration_error,
+    fit_temperature as fit_temperature,
+)
+from .correction import correct as correct, unwrapped as unwrapped
+from .dual import unwrap_dual as unwrap_dual
+from .kernel_density import unwrap_kernel_density as unwrap_kernel_density
+from .merge import (
+    RULES as RULES,
+    Merge as Merge,
+    merge_nearest as merge_nearest,
+    merge_regression as merge_regression,
+    merge_segmentation as merge_segmentation,
+    nearest_wraps as nearest_wraps,
+)
+from .metrics import depth_metrics as depth_metrics
+from .reflectance import ReflectancePrior as ReflectancePrior, calibrate as calibrate
+from .scoring import (
+    Scores as Scores,
+    evaluate as evaluate,
+    mean_scores as mean_scores,
+    score as score,
+)
+from .warp import move_depth as move_depth, points_of as points_of

@@ -1,0 +1,73 @@
+"""What the peers without a network share: wrap candidates, and the depth that they return."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from unwrap.signal import (
+    DepthFrame,
+    PhaseFrame,
+    RawFrame,
+    SensorDescription,
+    distance_m,
+    unambiguous_range_m,
+)
+
+
+@dataclass(frozen=True)
+class Unwrapped:
+    """Depth of a frame and how sure the method is of it; batch B.
+
+    Attributes
+    ----------
+    depth : DepthFrame
+        Where it is not valid, `distance_m` is still the method's best guess.
+    confidence : float32 [B, H, W]
+        0..1; what it means is the method's own.
+    """
+
+    depth: DepthFrame
+    confidence: Tensor
+
+
+def candidates_m(phase_rad: Tensor, frequency_hz: float, max_range_m: float) -> Tensor:
+    """Distances [B, N, H, W] with this phase [B, H, W], nearest first, N = those in the range."""
+    unambiguous_m = unambiguous_range_m(frequency_hz)
+    wraps = torch.arange(math.floor(max_range_m / unambiguous_m) + 1, device=phase_rad.device)
+    return distance_m(phase_rad, frequency_hz).unsqueeze(1) + wraps.view(-1, 1, 1) * unambiguous_m
+
+
+def chosen(values: Tensor, index: Tensor) -> Tensor:
+    """Of values [B, N, H, W], those at index [B, H, W]: [B, H, W]."""
+    return values.gather(1, index.unsqueeze(1)).squeeze(1)
+
+
+def unwrapped(
+    depth_m: Tensor,
+    confidence: Tensor,
+    first: PhaseFrame,
+    raw: RawFrame,
+    sensor: SensorDescription,
+    *,
+    noise_lsb: Tensor | float,
+    min_confidence: float,
+) -> Unwrapped:
+    """Valid where the signal is strong enough, not saturated, and the confidence high enough."""
+    valid = (first.amplitude >= sensor.min_snr * noise_lsb) & ~raw.saturated
+    valid &= confidence >= min_confidence
+    unambiguous_m = unambiguous_range_m(sensor.f1_hz)
+    frame = DepthFrame(
+        depth_m, valid, first.phase_rad, first.amplitude, first.residual, unambiguous_m
+    )
+    return Unwrapped(frame, confidence)
+
+
+def require_shots(raw: RawFrame, allowed: tuple[int, ...]) -> None:
+    """Raise ValueError unless `raw` has one of the allowed numbers of samples."""
+    if int(raw.shots) not in allowed:
+        expected = " or ".join(map(str, allowed))
+        raise ValueError(f"raw has {int(raw.shots)} samples; expected {expected}")

@@ -1,0 +1,227 @@
+"""Correction: raw samples and a network's prediction to unwrapped depth.
+
+Two or four samples are decoded and merged with the prediction; eight are unwrapped by their two
+frequencies, and need the prediction only where these disagree.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from unwrap.depth.dual import unwrap_dual
+from unwrap.depth.merge import RULES, Limits, Merge, merge_pixels
+from unwrap.signal import (
+    FLAT,
+    DepthFrame,
+    PhaseFrame,
+    RawFrame,
+    Sensed,
+    SensorDescription,
+    Shots,
+    decode_at,
+    distance_m,
+    is_strong,
+    phase_at,
+    quadratures,
+    samples_at,
+    unambiguous_range_m,
+)
+from unwrap.support import array, array_of, can_loop
+
+
+def correct(
+    raw: RawFrame,
+    predicted_m: Tensor | None,
+    sensor: SensorDescription,
+    *,
+    merge: Merge = "nearest",
+    offset_lsb: Tensor | None = None,
+    noise_lsb: Tensor | float | None = None,
+    shift_m: Tensor | None = None,
+) -> DepthFrame:
+    """Unwrapped depth of a batch of frames with the same number of samples.
+
+    Pixels that are invalid hold the prediction, the best guess there is, or NaN without one.
+
+    Parameters
+    ----------
+    raw : RawFrame
+        Two, four or eight samples.
+    predicted_m : float32 [B, H, W] or None
+        A network's coarse distance. None is allowed with eight samples.
+    merge : "nearest", "floor" or "none"
+        The nearest wrap candidate, ours; eq. 6; or the prediction as it is, for networks that
+        refine the measured distance. For TofSegNet, whose prediction lies within its likeliest
+        class, "floor" is eq. 8, with the prediction where the sensor saturates.
+    offset_lsb : float [H, W] or [B, H, W], optional
+        Stored dark-offset map.
+    noise_lsb : float or float [B, H, W], optional
+        Standard deviation of one sample, if known better than `sensor.noise_lsb`.
+    shift_m : float [B], optional
+        See `decode_at`.
+
+    Raises
+    ------
+    ValueError
+        Two or four samples without a prediction, an unknown merge, or samples that `decode`
+        refuses.
+    """
+    if merge not in RULES:
+        raise ValueError(f"merge is {merge!r}; expected one of {', '.join(RULES)}")
+    noise = sensor.noise_lsb if noise_lsb is None else noise_lsb
+    if raw.shots == Shots.EIGHT:
+        return _by_two_frequencies(raw, predicted_m, sensor, merge, offset_lsb, noise, shift_m)
+    if predicted_m is None:
+        raise ValueError(f"predicted_m is None; {int(raw.shots)} samples cannot be unwrapped alone")
+    if _can_loop(raw, predicted_m):
+        return _by_loop(raw, predicted_m, sensor, merge, offset_lsb, noise, shift_m)
+    return _by_torch(raw, predicted_m, sensor, merge, offset_lsb, noise, shift_m)
+
+
+def _by_two_frequencies(
+    raw: RawFrame,
+    predicted_m: Tensor | None,
+    sensor: SensorDescription,
+    merge: Merge,
+    offset_lsb: Tensor | None,
+    noise_lsb: Tensor | float,
+    shift_m: Tensor | None,
+) -> DepthFrame:
+    """Eight samples: the prediction is asked only where the frequencies disagree."""
+    first = decode_at(0, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
+    # Of the second frequency nothing but the phase is needed.
+    cosine, sine, *_ = quadratures(samples_at(1, raw), offset_lsb)
+    depth_m, residual_m = unwrap_dual(
+        first.phase_rad,
+        phase_at(1, cosine, sine, sensor, shift_m=shift_m),
+        sensor.f1_hz,
+        sensor.f2_hz,
+        max_range_m=sensor.max_range_m,
+    )
+    agree = residual_m <= sensor.max_residual_m
+    valid = is_strong(first.amplitude, noise_lsb, sensor) & ~raw.saturated
+    if predicted_m is None:
+        return _frame(depth_m, valid & agree, first, torch.nan, sensor)
+    depth_m = torch.where(agree, depth_m, _merged(first, predicted_m, sensor, merge))
+    return _frame(depth_m, valid, first, predicted_m, sensor)
+
+
+def _by_torch(
+    raw: RawFrame,
+    predicted_m: Tensor,
+    sensor: SensorDescription,
+    merge: Merge,
+    offset_lsb: Tensor | None,
+    noise_lsb: Tensor | float,
+    shift_m: Tensor | None,
+) -> DepthFrame:
+    """Two or four samples, by torch's operations: on any device, and with gradients."""
+    first = decode_at(0, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
+    valid = is_strong(first.amplitude, noise_lsb, sensor) & ~raw.saturated
+    return _frame(_merged(first, predicted_m, sensor, merge), valid, first, predicted_m, sensor)
+
+
+def _merged(
+    first: PhaseFrame, predicted_m: Tensor, sensor: SensorDescription, merge: Merge
+) -> Tensor:
+    """The first frequency's wrapped map, unwrapped by the prediction."""
+    return RULES[merge].of_tensors(
+        predicted_m,
+        distance_m(first.phase_rad, sensor.f1_hz),
+        unambiguous_range_m(sensor.f1_hz),
+        sensor.saturation_range_m,
+    )
+
+
+def _frame(
+    depth_m: Tensor,
+    valid: Tensor,
+    first: PhaseFrame,
+    guess_m: Tensor | float,
+    sensor: SensorDescription,
+) -> DepthFrame:
+    """`depth_m` where valid, else the guess."""
+    return DepthFrame(
+        torch.where(valid, depth_m, guess_m),
+        valid,
+        first.phase_rad,
+        first.amplitude,
+        first.residual,
+        unambiguous_range_m(sensor.f1_hz),
+    )
+
+
+def _can_loop(raw: RawFrame, predicted_m: Tensor) -> bool:
+    """Whether `merge_pixels` may do the work: samples in memory, and maps of one shape."""
+    samples = raw.dcs_lsb
+    # A loop trusts shapes, where torch would broadcast or refuse them.
+    fits = samples.ndim == 4 and samples[:, 0].shape == raw.saturated.shape == predicted_m.shape
+    return fits and can_loop(samples, predicted_m)
+
+
+def _by_loop(
+    raw: RawFrame,
+    predicted_m: Tensor,
+    sensor: SensorDescription,
+    merge: Merge,
+    offset_lsb: Tensor | None,
+    noise_lsb: Tensor | float,
+    shift_m: Tensor | None,
+) -> DepthFrame:
+    """Two or four samples, by compiled loops: several times faster than torch on processors."""
+    cosine, sine, amplitude, residual = quadratures(raw.dcs_lsb, offset_lsb)
+    # The quadratures lend their memory: what is in the processor's cache need not be fetched.
+    phase_rad, depth_m = torch.atan2(sine, cosine, out=cosine), sine
+    valid = torch.empty(raw.saturated.shape, dtype=torch.bool)
+    unambiguous_m = unambiguous_range_m(sensor.f1_hz)
+    merge_pixels(
+        array(phase_rad),
+        (FLAT if sensor.wiggle is None else sensor.wiggle[0]).straight,
+        _shift_turns(shift_m, unambiguous_m, len(valid)),
+        array(amplitude),
+        array_of(noise_lsb, valid.shape),
+        array(raw.saturated, np.bool_),
+        array(predicted_m),
+        Limits(*map(np.float32, (unambiguous_m, sensor.saturation_range_m, sensor.min_snr))),
+        RULES[merge].branch,
+        array(depth_m),
+        array(valid, np.bool_),
+    )
+    return DepthFrame(depth_m, valid, phase_rad, amplitude, residual, unambiguous_m)
+
+
+def _shift_turns(shift_m: Tensor | None, unambiguous_m: float, batch: int) -> np.ndarray:
+    """A shift of each frame, float32 [B], as a share of the unambiguous range."""
+    turns = np.zeros(batch, np.float32)
+    if shift_m is not None:
+        turns[:] = shift_m.numpy() % unambiguous_m / unambiguous_m
+    return turns
+
+
+def unwrapped(
+    sensed: Sensed,
+    predicted_m: Tensor | None,
+    sensor: SensorDescription,
+    *,
+    merge: Merge = "nearest",
+) -> DepthFrame:
+    """`unwrap.depth.correction.correct` of frames with samples and a prediction [B, H, W] for them.
+
+    Raises
+    ------
+    ValueError
+        No samples, or what `correct` refuses.
+    """
+    if sensed.raw is None:
+        raise ValueError("raw is None; expected samples")
+    return correct(
+        sensed.raw,
+        predicted_m,
+        sensor,
+        merge=merge,
+        offset_lsb=sensed.offset_lsb,
+        noise_lsb=sensed.noise_lsb,
+        shift_m=sensed.shift_m,
+    )

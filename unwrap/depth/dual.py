@@ -1,0 +1,85 @@
+"""Two-frequency unwrapping: the pair of wrap candidates that agree best, within a range."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import torch
+from torch import Tensor
+
+from unwrap.signal import distance_m, unambiguous_range_m
+
+
+def unwrap_dual(
+    phase1_rad: Tensor, phase2_rad: Tensor, f1_hz: float, f2_hz: float, *, max_range_m: float
+) -> tuple[Tensor, Tensor]:
+    """Distance from the wrapped phases at two frequencies.
+
+    Of all wraps of f1 up to `max_range_m`, each with its nearest wrap of f2, the one with the
+    smallest disagreement wins. The two distances are fused by inverse variance: at equal phase
+    noise the standard deviation goes with 1 / f, so the weights go with f^2.
+
+    Parameters
+    ----------
+    phase1_rad, phase2_rad : float [..., H, W]
+        Phases in [0, 2 pi) at `f1_hz` and `f2_hz`.
+    max_range_m : float
+        Largest distance considered, metres. In noise a wrong candidate may win anywhere in this
+        range, so it should be no larger than the scene.
+
+    Returns
+    -------
+    distance_m : float [..., H, W]
+        Fused distance, metres, never negative.
+    residual_m : float [..., H, W]
+        Disagreement of the two frequencies, metres.
+
+    Raises
+    ------
+    ValueError
+        Unequal shapes, or a frequency or range that is not positive.
+    """
+    _check(phase1_rad, phase2_rad, f1_hz, f2_hz, max_range_m)
+    range1_m, range2_m = unambiguous_range_m(f1_hz), unambiguous_range_m(f2_hz)
+    wrapped1_m, wrapped2_m = distance_m(phase1_rad, f1_hz), distance_m(phase2_rad, f2_hz)
+    # Disagreements are held in wraps of f2, where the nearest candidate is a rounding away.
+    gap = (wrapped1_m - wrapped2_m).mul_(1 / range2_m)
+    last = math.floor(max_range_m / range1_m)
+    wraps = _nearest(gap, range1_m / range2_m, last + 1)
+    if last:
+        fits = wrapped1_m < max_range_m - last * range1_m
+        wraps = torch.where(fits, wraps, _nearest(gap, range1_m / range2_m, last))
+    best = gap.add_(wraps, alpha=range1_m / range2_m)
+    best.sub_(best.round())
+    share2 = f2_hz**2 / (f1_hz**2 + f2_hz**2)
+    fused_m = wrapped1_m.add_(wraps, alpha=range1_m).sub_(best, alpha=share2 * range2_m)
+    return fused_m.clamp_(min=0), best.abs_().mul_(range2_m)
+
+
+def _nearest(gap: Tensor, wrap: float, count: int) -> Tensor:
+    """The n below `count` that brings `gap` + n `wrap` nearest to a whole number.
+
+    Candidate n fits exactly where the fraction of the gap is that of -n `wrap`. On the circle of
+    fractions it is the nearest one up to half way to its neighbours.
+    """
+    places = sorted((-n * wrap % 1.0, n) for n in range(count))
+    # From half way between the last place and the first, that of no wrap, all the way round.
+    start = (places[-1][0] + 1.0) / 2.0
+    turned = gap.add(2.0 - start).frac_()
+    wraps, beyond = torch.zeros_like(gap), torch.empty_like(gap)
+    for (low, before), (high, after) in pairwise(places):
+        torch.ge(turned, (low + high) / 2.0 + 1.0 - start, out=beyond)
+        wraps.add_(beyond, alpha=after - before)
+    return wraps
+
+
+def _check(phase1: Tensor, phase2: Tensor, f1_hz: float, f2_hz: float, max_range_m: float) -> None:
+    if phase1.shape != phase2.shape:
+        raise ValueError(
+            f"phase2_rad has shape {tuple(phase2.shape)}; expected that of phase1_rad, "
+            f"{tuple(phase1.shape)}"
+        )
+    for name, value in (("f1_hz", f1_hz), ("f2_hz", f2_hz), ("max_range_m", max_range_m)):
+        if not (value > 0 and math.isfinite(value)):
+            raise ValueError(f"{name} is {value}; expected a positive number")

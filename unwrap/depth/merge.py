@@ -1,0 +1,159 @@
+"""Merging a prediction with a wrapped distance map: eq. 6, eq. 8, the nearest candidate, or none.
+
+All take and return [..., H, W] in metres. Equation numbers are those of Nagiub et al. (2023).
+`wrapped_m` is the distance within one unambiguous range, `saturation_m` the wrapped distance from
+which on the sensor is not to be trusted.
+
+Every rule of `RULES` has two forms, which a test holds together: a function of torch tensors, for
+any device and for exported files, and a branch of the compiled loop `merge_pixels`, which also
+decodes and judges each pixel and is what processors use.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Literal, NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from unwrap.signal import Straight
+from unwrap.support import loop
+
+Array = np.ndarray
+Merge = Literal["nearest", "floor", "none"]
+ZERO, TWO_PI = np.float32(0.0), np.float32(2 * np.pi)
+NONE, FLOOR, NEAREST = range(3)
+"""Branches of `merge_pixels`."""
+
+
+def nearest_wraps(predicted_m: Tensor, wrapped_m: Tensor, unambiguous_m: float) -> Tensor:
+    """Whole wraps, as floats, that bring `wrapped_m` nearest to `predicted_m`; never negative."""
+    return predicted_m.sub(wrapped_m).mul_(1 / unambiguous_m).round_().clamp_(min=0)
+
+
+def merge_regression(
+    predicted_m: Tensor, wrapped_m: Tensor, unambiguous_m: float, saturation_m: float
+) -> Tensor:
+    """Eq. 6: floor(d_p / d_u) d_u + d_M1 where d_M1 < d_sat, else d_p."""
+    wraps = predicted_m.mul(1 / unambiguous_m).floor_()
+    return _unwrapped(wraps, wrapped_m, unambiguous_m, predicted_m, saturation_m)
+
+
+def merge_segmentation(
+    wraps: Tensor, wrapped_m: Tensor, unambiguous_m: float, saturation_m: float
+) -> Tensor:
+    """Eq. 8: class d_u + d_M1 where d_M1 < d_sat, else class d_u."""
+    return _unwrapped(wraps, wrapped_m, unambiguous_m, wraps * unambiguous_m, saturation_m)
+
+
+def merge_nearest(
+    predicted_m: Tensor, wrapped_m: Tensor, unambiguous_m: float, saturation_m: float
+) -> Tensor:
+    """n d_u + d_M1 with n = max(0, round((d_p - d_M1) / d_u)) where d_M1 < d_sat, else d_p.
+
+    Ours. Right wherever the prediction errs by less than half an unambiguous range, while eq. 6
+    errs as soon as prediction and truth lie on different sides of a wrap.
+    """
+    wraps = nearest_wraps(predicted_m, wrapped_m, unambiguous_m)
+    return _unwrapped(wraps, wrapped_m, unambiguous_m, predicted_m, saturation_m)
+
+
+def merge_none(
+    predicted_m: Tensor, wrapped_m: Tensor, unambiguous_m: float, saturation_m: float
+) -> Tensor:
+    """The prediction as it is: of networks that have seen the samples and refine each distance."""
+    return predicted_m.clone()
+
+
+def _unwrapped(
+    wraps: Tensor, wrapped_m: Tensor, unambiguous_m: float, otherwise_m: Tensor, saturation_m: float
+) -> Tensor:
+    unwrapped_m = torch.add(wrapped_m, wraps, alpha=unambiguous_m)
+    return torch.where(wrapped_m < saturation_m, unwrapped_m, otherwise_m.to(unwrapped_m))
+
+
+class Rule(NamedTuple):
+    """A merge rule: its function of tensors, and its branch of `merge_pixels`."""
+
+    of_tensors: Callable[[Tensor, Tensor, float, float], Tensor]
+    branch: int
+
+
+RULES: Mapping[Merge, Rule] = {
+    "nearest": Rule(merge_nearest, NEAREST),
+    "floor": Rule(merge_regression, FLOOR),
+    "none": Rule(merge_none, NONE),
+}
+"""All merge rules, by the name that configurations and the command line use."""
+
+
+class Limits(NamedTuple):
+    """Constants of a sensor, float32: its unambiguous range, and what `correct` trusts."""
+
+    unambiguous_m: np.float32
+    saturation_m: np.float32
+    min_snr: np.float32
+
+
+@loop
+def merge_pixels(
+    angle_rad: Array,
+    straight: Straight,
+    shift_turns: Array,
+    amplitude: Array,
+    noise: Array,
+    saturated: Array,
+    predicted_m: Array,
+    limits: Limits,
+    branch: int,
+    distance_m: Array,
+    valid: Array,
+) -> None:
+    """Angles to distances, unwrapped by a prediction; maps are [B, H, W], float32 or bool.
+
+    The first steps are those of `unwrap.signal`: angle to turns without the stored phase error,
+    the shift added, turns to phase.
+
+    Parameters
+    ----------
+    angle_rad
+        atan2 of the quadratures, in [-pi, pi]; becomes the phase in [0, 2 pi).
+    shift_turns : float32 [B]
+        Added to the turns; not negative.
+    branch : int
+        `NONE`, `FLOOR` or `NEAREST`, see `RULES`.
+    distance_m, valid
+        Are written.
+    """
+    unambiguous_m, saturation_m, min_snr = limits
+    metres_per_rad, per_m = unambiguous_m / TWO_PI, np.float32(1.0) / unambiguous_m
+    constant, slope, first, bins_per_rad = straight
+    nearest, merges = branch == NEAREST, branch != NONE
+    frames, rows, columns = angle_rad.shape
+    for b in range(frames):
+        for i in range(rows):
+            angle, strong, weak = angle_rad[b, i], amplitude[b, i], noise[b, i]
+            full, guess, out, good = (
+                saturated[b, i],
+                predicted_m[b, i],
+                distance_m[b, i],
+                valid[b, i],
+            )
+            # A look into a table keeps a loop from taking many pixels at once: it has its own.
+            for j in range(columns):
+                place = first + bins_per_rad * angle[j]
+                line = np.uint32(place)  # A sign would have to be looked at.
+                out[j] = constant[line] + slope[line] * place + shift_turns[b]
+            for j in range(columns):
+                phase_rad = (out[j] - np.floor(out[j])) * TWO_PI
+                wrapped_m = phase_rad * metres_per_rad
+                if nearest:
+                    wraps = max(np.rint((guess[j] - wrapped_m) * per_m), ZERO)
+                else:
+                    wraps = np.floor(guess[j] * per_m)
+                good[j] = (strong[j] - min_snr * weak[j] >= ZERO) & (not full[j])
+                trusted = merges & good[j] & (wrapped_m < saturation_m)
+                out[j] = wrapped_m + wraps * unambiguous_m if trusted else guess[j]
+                angle[j] = phase_rad

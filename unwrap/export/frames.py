@@ -1,0 +1,256 @@
+"""Frames that an exported network is checked and calibrated with: of a bank, or made up."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from shotenv.bank import Bank, BankError, check_fits, open_bank
+from shotenv.config import EnvConfig, SensorConfig
+from shotenv.dataset import SensedFrames
+from shotenv.sensor import describe
+from unwrap.signal import (
+    GRAY_FULL_SCALE,
+    SAMPLES_PER_FREQUENCY,
+    TWO_PI,
+    RawFrame,
+    Sensed,
+    SensorDescription,
+    Shots,
+    correlation_samples,
+    decode,
+    distance_m,
+    noise_of,
+    samples_of,
+    unambiguous_range_m,
+    wrapped_distance_m,
+)
+from unwrap.support import mapped
+
+DEFAULT_BANK = "starter"
+MADE_UP = "none"
+OCTAVES = (4, 8, 16, 32)
+"""Details of made-up images: grids of so many cells down and across."""
+LARGEST_WORD = 2047
+"""Of a 12-bit converter, about its mid-scale."""
+DRAW = 0
+"""Draw of noise, laser power and temperature that a bank's frames are sensed with."""
+
+
+@dataclass(frozen=True)
+class ExportFrames:
+    """Inputs of an exported network, and what is true of them.
+
+    Attributes
+    ----------
+    source : str
+        Where they come from, in words.
+    inputs : mapping of str to Tensor [N, ...]
+        What the file takes, by name: see `unwrap.export.onnx_files`.
+    wrapped_m : float32 [N, H, W]
+        Wrapped distances at f1: without noise beside gray images, else as the samples tell them.
+    truth_m : float32 [N, H, W] or None
+        True distances, infinite for the sky; None of made-up images.
+    scored : bool [N, H, W] or None
+        Pixels whose wrap counts: within the sensor's range and, of samples, with signal enough.
+        None of made-up images.
+    """
+
+    source: str
+    inputs: Mapping[str, Tensor]
+    wrapped_m: Tensor
+    truth_m: Tensor | None = None
+    scored: Tensor | None = None
+
+    def one_by_one(self) -> list[dict[str, Tensor]]:
+        """What the file takes for each frame."""
+        frames = zip(*(values.split(1) for values in self.inputs.values()), strict=True)
+        return [dict(zip(self.inputs, frame, strict=True)) for frame in frames]
+
+
+def choose_bank(name: str | None, sensor: SensorConfig) -> Bank | None:
+    """Bank by name or path; None for "none", and for no name where the starter does not stand.
+
+    Raises
+    ------
+    ValueError
+        A named bank is missing, or was rendered for another sensor.
+    """
+    if name == MADE_UP:
+        return None
+    try:
+        bank = open_bank(name or DEFAULT_BANK, render=False)
+    except BankError:
+        if name is None:
+            return None
+        raise
+    check_fits(bank, sensor)
+    return bank
+
+
+def export_frames(
+    bank: Bank | None,
+    split: str,
+    count: int,
+    size: tuple[int, int],
+    config: EnvConfig,
+    shots: Shots | None = None,
+) -> ExportFrames:
+    """`count` frames of a split, evenly spread; images of another size than `size` are scaled.
+
+    Parameters
+    ----------
+    bank : Bank or None
+        None makes images up.
+    split : str
+    count : int
+    size : tuple of two int
+        Height and width, pixels.
+    config : EnvConfig
+        Of it the sensor, the laser and the frame rate.
+    shots : Shots or None
+        Samples of each frame, two or four, for a network that looks at them; None for one that
+        looks at the gray image alone.
+    """
+    if bank is None:
+        return _made_up(split, count, size, config.sensor, shots)
+    frames = bank.frames(split)
+    frames = frames[torch.linspace(0, len(frames) - 1, min(count, len(frames))).long()]
+    source = f"{len(frames)} {split} frames of bank {bank.manifest.name}"
+    if shots is None:
+        found = _gray_frames(bank, frames, config.sensor, source)
+    else:
+        found = _sample_frames(bank, frames, config, shots, source)
+    return _scaled(found, size)
+
+
+def _gray_frames(bank: Bank, frames: Tensor, sensor: SensorConfig, source: str) -> ExportFrames:
+    exposure = bank.exposure(frames)
+    first = decode(exposure.correlation[:, :SAMPLES_PER_FREQUENCY])
+    wrapped_m = distance_m(first.phase_rad, sensor.f1_hz)
+    return ExportFrames(
+        source=source,
+        inputs={"gray": bank.gray(frames), "wrapped_m": wrapped_m},
+        wrapped_m=wrapped_m,
+        truth_m=exposure.distance_m,
+        scored=exposure.distance_m <= sensor.max_range_m,
+    )
+
+
+def _sample_frames(
+    bank: Bank, frames: Tensor, config: EnvConfig, shots: Shots, source: str
+) -> ExportFrames:
+    sensed_frames = SensedFrames(bank, frames, config, range_m=config.sensor.max_range_m)
+    numbers = range(len(frames))
+    sensed, _ = sensed_frames.batch(numbers, draw=DRAW, shots=shots)
+    return ExportFrames(
+        source=f"{source}, {shots:d} samples each",
+        inputs=sample_inputs(bank.gray(frames), sensed, sensed_frames.sensor),
+        wrapped_m=wrapped_distance_m(sensed, sensed_frames.sensor),
+        truth_m=bank.exposure(frames).distance_m,
+        scored=sensed_frames.scored(numbers, draw=DRAW),
+    )
+
+
+def sample_inputs(gray: Tensor, sensed: Sensed, sensor: SensorDescription) -> dict[str, Tensor]:
+    """Inputs of a file of a network that looks at samples, by name.
+
+    Parameters
+    ----------
+    gray : uint16 [N, H, W]
+        12-bit gray images.
+    sensed : Sensed
+        The samples beside them. An offset or shift that is not known is 0, a noise that is not
+        known that in the dark; memory is left out.
+    sensor : SensorDescription
+    """
+    raw, zeros = samples_of(sensed), torch.zeros_like(sensed.gray)
+    shift_m = zeros[:, 0, 0] if sensed.shift_m is None else sensed.shift_m
+    return {
+        "gray": gray,
+        "dcs_lsb": raw.dcs_lsb,
+        "saturated": raw.saturated,
+        "offset_lsb": zeros if sensed.offset_lsb is None else sensed.offset_lsb,
+        "noise_lsb": zeros + noise_of(sensed, sensor),
+        "shift_m": shift_m.to(torch.float32),
+    }
+
+
+def _scaled(frames: ExportFrames, size: tuple[int, int]) -> ExportFrames:
+    """Frames with every map at `size`: the pixels nearest above and to the left."""
+    rows, columns = (
+        torch.arange(wanted) * given // wanted
+        for wanted, given in zip(size, frames.wrapped_m.shape[-2:], strict=True)
+    )
+
+    def scaled(values: Tensor) -> Tensor:
+        return values[..., rows, :][..., columns] if values.ndim > 1 else values
+
+    return replace(
+        frames,
+        inputs={name: scaled(values) for name, values in frames.inputs.items()},
+        wrapped_m=scaled(frames.wrapped_m),
+        truth_m=mapped(scaled, frames.truth_m),
+        scored=mapped(scaled, frames.scored),
+    )
+
+
+def _made_up(
+    split: str, count: int, size: tuple[int, int], sensor: SensorConfig, shots: Shots | None
+) -> ExportFrames:
+    """Clouds of light and of distance, other ones for each split; always the same."""
+    # 12 decorrelates the two splits that are ever asked for.
+    generator = torch.Generator().manual_seed(12 if split == "train" else 0)
+    light, far = (_clouds(count, size, generator) for _ in range(2))
+    gray = (GRAY_FULL_SCALE * torch.sigmoid(2.0 * light - 1.0)).round().to(torch.uint16)
+    distance, source = 30.0 * torch.sigmoid(2.0 * far), f"{count} made-up images"
+    if shots is None:
+        wrapped_m = distance.remainder(unambiguous_range_m(sensor.f1_hz))
+        return ExportFrames(source, {"gray": gray, "wrapped_m": wrapped_m}, wrapped_m)
+    phase_rad = distance * (TWO_PI / unambiguous_range_m(sensor.f1_hz))
+    strength = torch.sigmoid(2.0 * _clouds(count, size, generator) - 2.0)
+    sensed = _made_up_samples(gray, phase_rad, strength, shots, generator)
+    described = describe(sensor)
+    return ExportFrames(
+        f"{source}, {shots:d} samples each",
+        sample_inputs(gray, sensed, described),
+        wrapped_distance_m(sensed, described),
+    )
+
+
+def _made_up_samples(
+    gray: Tensor, phase_rad: Tensor, strength: Tensor, shots: Shots, generator: torch.Generator
+) -> Sensed:
+    """Converter words of sines, `strength` 0..1 [N, H, W] strong; light in the gray adds noise."""
+    fractions = gray.to(torch.float32) / GRAY_FULL_SCALE
+    offset_lsb = 3.0 * torch.randn(gray.shape, generator=generator)
+    noise_lsb = (2.0 + 100.0 * fractions).sqrt()
+    sines = correlation_samples(phase_rad, ((1, 1.0),))[:shots].movedim(0, 1)
+    noise = torch.randn(sines.shape, generator=generator)
+    # The strongest leave the converter's range.
+    light = 1.5 * LARGEST_WORD * strength.unsqueeze(1) * sines
+    words = (light + noise_lsb.unsqueeze(1) * noise + offset_lsb.unsqueeze(1)).round()
+    return Sensed(
+        gray=fractions,
+        raw=RawFrame(
+            dcs_lsb=words.clamp(-LARGEST_WORD, LARGEST_WORD),
+            saturated=(words.abs() >= LARGEST_WORD).any(1),
+        ),
+        offset_lsb=offset_lsb,
+        noise_lsb=noise_lsb,
+        shift_m=0.02 * torch.randn(len(gray), generator=generator),
+    )
+
+
+def _clouds(count: int, size: tuple[int, int], generator: torch.Generator) -> Tensor:
+    """Smooth noise float32 [count, H, W], about normal: half the amplitude at twice the detail."""
+    total = torch.zeros(count, *size)
+    for octave, cells in enumerate(OCTAVES):
+        grid = torch.randn(count, 1, cells, cells, generator=generator)
+        smooth = functional.interpolate(grid, size, mode="bilinear", align_corners=False)
+        total += smooth[:, 0] / 2**octave
+    return total

@@ -1,0 +1,71 @@
+"""What the peer networks share: sample planes, masked means, agreement with the phase."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+
+from unwrap.depth import nearest_wraps
+from unwrap.networks import Prediction, compressed
+from unwrap.signal import (
+    SAMPLES_PER_FREQUENCY,
+    Sensed,
+    SensorDescription,
+    first_phase,
+    noise_of,
+    samples_of,
+    unambiguous_range_m,
+    wrapped_distance_m,
+)
+
+PLANES = SAMPLES_PER_FREQUENCY + 3
+"""Maps that `sample_planes` gives."""
+
+
+def sample_planes(sensed: Sensed, sensor: SensorDescription) -> Tensor:
+    """Samples at f1 over their amplitude, and what says how far to trust them.
+
+    The samples are turned by what is known of wiggle and drift: D_k is A cos(phi - k pi / 2) of the
+    corrected phase plus the half sum of its pair of opposite samples, which is 0 but for noise,
+    motion and saturation. Two samples leave the last two planes 0.
+
+    Returns
+    -------
+    float32 [B, 7, H, W]
+        Four samples over amplitude, in about [-2, 2]; compressed amplitude over noise, see
+        `unwrap.networks.features.compressed`; saturation, 0 or 1; 1 with four samples, 0 with two.
+    """
+    frame, noise, raw = first_phase(sensed, sensor), noise_of(sensed, sensor), samples_of(sensed)
+    samples = raw.dcs_lsb[:, :SAMPLES_PER_FREQUENCY]
+    planes = frame.phase_rad.new_zeros(len(samples), PLANES, *samples.shape[-2:])
+    for k in range(samples.shape[1]):
+        planes[:, k] = (frame.phase_rad - k * (math.pi / 2)).cos()
+    if samples.shape[1] == SAMPLES_PER_FREQUENCY:
+        if sensed.offset_lsb is not None:
+            samples = samples - sensed.offset_lsb.unsqueeze(-3)
+        common = (samples + samples.roll(2, 1)) / 2
+        planes[:, :4] += (common / (frame.amplitude + noise).unsqueeze(1)).clamp(-1, 1)
+        planes[:, 6] = 1.0
+    planes[:, 4] = compressed(frame.amplitude / noise)
+    planes[:, 5] = raw.saturated
+    return planes.contiguous(memory_format=torch.channels_last)
+
+
+def mean_of_known(values: Tensor, known: Tensor) -> Tensor:
+    """Mean of `values` where the bool `known` of their shape holds; 0 where it holds nowhere."""
+    return values.where(known, 0.0).sum() / known.sum().clamp(min=1)
+
+
+def judged(distance_m: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
+    """A regressed distance, with its agreement with the measured phase as confidence.
+
+    The confidence is 1 where the distance is a wrap candidate of the phase and 0 halfway between
+    two, where the nearest candidate is a matter of chance; 0 as well below the first.
+    """
+    unambiguous_m = unambiguous_range_m(sensor.f1_hz)
+    wrapped_m = wrapped_distance_m(sensed, sensor)
+    wraps = nearest_wraps(distance_m, wrapped_m, unambiguous_m)
+    gap = (distance_m - wrapped_m) / unambiguous_m - wraps
+    return Prediction(distance_m, (1 - 2 * gap.abs()).clamp(min=0))

@@ -1,0 +1,121 @@
+"""Network weights on disk: safetensors with metadata, written atomically, never unpickled.
+
+Convolution kernels are stored as float16, normalisation in float32. The metadata holds what is
+needed to build the network, where it comes from, and a SHA-256 of the tensors.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
+from torch import Tensor, nn
+
+from unwrap.networks.base import Network, Settings
+from unwrap.networks.registry import build
+from unwrap.networks.sizes import trained_size
+from unwrap.support import write_bytes
+
+SCHEMA = "1"
+"""Version of the metadata."""
+MAX_BYTES = 1 << 28
+"""Files larger than this are no networks of this project."""
+
+
+@dataclass(frozen=True)
+class Weights:
+    """A network read from disk.
+
+    Attributes
+    ----------
+    network : Network
+        In evaluation mode, float32.
+    metadata : dict
+        What was stored with it.
+    fingerprint : str
+        SHA-256 of the tensors, hexadecimal.
+    """
+
+    network: Network
+    metadata: dict[str, Any]
+    fingerprint: str
+
+
+def save_weights(path: Path, network: nn.Module, metadata: Mapping[str, Any]) -> None:
+    """Write the weights of `network` and `metadata` (plain JSON values) to `path`."""
+    tensors = {name: _stored(tensor) for name, tensor in network.state_dict().items()}
+    values = {"schema": SCHEMA, "sha256": fingerprint(tensors), **metadata}
+    words = {
+        key: value if isinstance(value, str) else json.dumps(value) for key, value in values.items()
+    }
+    write_bytes(path, save(tensors, words))
+
+
+def _stored(tensor: Tensor) -> Tensor:
+    half = tensor.is_floating_point() and tensor.ndim >= 2
+    return tensor.detach().cpu().to(torch.float16 if half else tensor.dtype).contiguous()
+
+
+def fingerprint(tensors: Mapping[str, Tensor]) -> str:
+    """SHA-256 over names, types, shapes and bytes of the tensors."""
+    digest = hashlib.sha256()
+    for name in sorted(tensors):
+        tensor = tensors[name]
+        digest.update(f"{name} {tensor.dtype} {tuple(tensor.shape)}".encode())
+        digest.update(tensor.contiguous().numpy().tobytes())
+    return digest.hexdigest()
+
+
+def load_weights(path: Path) -> Weights:
+    """Read a network.
+
+    Raises
+    ------
+    ValueError
+        The file is missing, damaged, no safetensors file, or no network of this project; the
+        message names the file and the cure.
+    """
+    cure = "train it again (`shotenv unwrap train`) or fetch it again"
+    try:
+        if not path.is_file():
+            raise ValueError("no such file")
+        if path.stat().st_size > MAX_BYTES:
+            raise ValueError(f"more than {MAX_BYTES >> 20} MiB")
+        with safe_open(path, framework="pt") as file:
+            words = dict(file.metadata() or {})
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        return _built(words, tensors)
+    except (ValueError, TypeError, KeyError, OSError, RuntimeError, SafetensorError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise ValueError(f"{path}: unusable network file ({reason}); {cure}") from None
+
+
+def _built(words: Mapping[str, str], tensors: Mapping[str, Tensor]) -> Weights:
+    if words.get("schema") != SCHEMA:
+        raise ValueError(f"schema is {words.get('schema')!r}; expected {SCHEMA!r}")
+    digest = fingerprint(tensors)
+    if words["sha256"] != digest:
+        raise ValueError("its tensors do not match its checksum")
+    metadata = {key: _value(word) for key, word in words.items()}
+    trained_size(metadata)  # refused here rather than at the first frame
+    network = build(metadata["network"], Settings.of(metadata))
+    network.load_state_dict({name: tensor.to(_type_in(tensor)) for name, tensor in tensors.items()})
+    return Weights(network.eval(), metadata, digest)
+
+
+def _value(word: str) -> Any:
+    try:
+        return json.loads(word)
+    except ValueError:
+        return word
+
+
+def _type_in(tensor: Tensor) -> torch.dtype:
+    return torch.float32 if tensor.is_floating_point() else tensor.dtype

@@ -1,0 +1,5 @@
+"""Real cameras: recordings from files, their correction, the files of their depth."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,48 @@
+from .calibrated import decode_at as decode_at, phase_at as phase_at, samples_at as samples_at
+from .decoding import (
+    TWO_PI as TWO_PI,
+    decode as decode,
+    distance_m as distance_m,
+    quadratures as quadratures,
+)
+from .description import SensorDescription as SensorDescription
+from .frames import DepthFrame as DepthFrame, PhaseFrame as PhaseFrame, RawFrame as RawFrame
+from .frequencies import (
+    candidate_spacing_m as candidate_spacing_m,
+    joint_range_m as joint_range_m,
+    unambiguous_range_m as unambiguous_range_m,
+)
+from .sensed import (
+    Memory as Memory,
+    Sensed as Sensed,
+    Truth as Truth,
+    first_phase as first_phase,
+    is_strong as is_strong,
+    measured as measured,
+    noise_of as noise_of,
+    samples_of as samples_of,
+    wrapped_distance_m as wrapped_distance_m,
+)
+from .shots import (
+    SAMPLES_PER_FREQUENCY as SAMPLES_PER_FREQUENCY,
+    Shots as Shots,
+    demodulation_phase_rad as demodulation_phase_rad,
+    frequency_index as frequency_index,
+    harmonic_weights as harmonic_weights,
+    sample_times_s as sample_times_s,
+)
+from .wiggle import (
+    FLAT as FLAT,
+    Straight as Straight,
+    WiggleTable as WiggleTable,
+    correlation_samples as correlation_samples,
+    read_wiggle as read_wiggle,
+    wiggle_of as wiggle_of,
+    wrapped as wrapped,
+)
+from .words import (
+    ADC_BITS as ADC_BITS,
+    GRAY_FULL_SCALE as GRAY_FULL_SCALE,
+    from_words as from_words,
+    mid_scale as mid_scale,
+)

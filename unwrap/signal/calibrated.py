@@ -1,0 +1,57 @@
+"""Phase at one frequency of a frame, without what the sensor's calibration knows to be wrong."""
+
+from __future__ import annotations
+
+from torch import Tensor
+
+from unwrap.signal.decoding import (
+    angle_of,
+    quadratures,
+    to_phase_,
+    to_turns_,
+)
+from unwrap.signal.description import SensorDescription
+from unwrap.signal.frames import PhaseFrame, RawFrame
+from unwrap.signal.shots import SAMPLES_PER_FREQUENCY
+from unwrap.signal.wiggle import shift_turns_
+
+
+def decode_at(
+    frequency: int,
+    raw: RawFrame,
+    sensor: SensorDescription,
+    *,
+    offset_lsb: Tensor | None = None,
+    shift_m: Tensor | None = None,
+) -> PhaseFrame:
+    """Phase and amplitude of the samples at f1 (0) or f2 (1), the stored wiggle removed.
+
+    `shift_m` [B] is added to the wrapped distances: minus the drift that a real sensor's
+    temperature tells; or what its compensation leaves, where samples are simulated without drift.
+    """
+    cosine, sine, amplitude, residual = quadratures(samples_at(frequency, raw), offset_lsb)
+    phase_rad = phase_at(frequency, cosine, sine, sensor, shift_m=shift_m)
+    return PhaseFrame(phase_rad, amplitude, residual)
+
+
+def samples_at(frequency: int, raw: RawFrame) -> Tensor:
+    """Samples [B, 2 or 4, H, W] at f1 (0) or f2 (1)."""
+    start = frequency * SAMPLES_PER_FREQUENCY
+    return raw.dcs_lsb[:, start : start + SAMPLES_PER_FREQUENCY]
+
+
+def phase_at(
+    frequency: int,
+    cosine: Tensor,
+    sine: Tensor,
+    sensor: SensorDescription,
+    *,
+    shift_m: Tensor | None,
+) -> Tensor:
+    """Phase [B, H, W] in [0, 2 pi) of quadratures at f1 (0) or f2 (1); see `decode_at`."""
+    angle_rad = angle_of(cosine, sine)
+    straight = to_turns_ if sensor.wiggle is None else sensor.wiggle[frequency].turns_of
+    turns = straight(angle_rad)
+    if shift_m is not None:
+        shift_turns_(turns, shift_m, (sensor.f1_hz, sensor.f2_hz)[frequency])
+    return to_phase_(turns)

@@ -1,0 +1,158 @@
+"""Correlation samples to phase, and phase to distance.
+
+The samples are D_k ~ m S cos(phi - k pi / 2), see `unwrap.signal.shots`; distance and phase are tied
+by phi = 4 pi f d / c (mod 2 pi).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from unwrap.signal.frames import PhaseFrame
+from unwrap.signal.frequencies import unambiguous_range_m
+from unwrap.support import array, array_of, can_loop, loop
+
+Array = np.ndarray
+HALF, ZERO = np.float32(0.5), np.float32(0.0)
+TWO_PI = 2 * math.pi
+BELOW_TWO_PI = float(np.nextafter(np.float32(TWO_PI), np.float32(0)))
+"""Largest float32 phase of a period."""
+
+
+def distance_m(phase_rad: Tensor, frequency_hz: float) -> Tensor:
+    """Wrapped distance of a phase: d = c phi / (4 pi f)."""
+    return phase_rad * (unambiguous_range_m(frequency_hz) / TWO_PI)
+
+
+def decode(dcs: Tensor, *, offset_lsb: Tensor | None = None) -> PhaseFrame:
+    """Phase and amplitude of two or four samples of one modulation frequency.
+
+    Four samples: phi = atan2(D1 - D3, D0 - D2), A = hypot(D1 - D3, D0 - D2) / 2; offsets cancel.
+    Two samples: phi = atan2(D1, D0), A = hypot(D1, D0); nothing cancels.
+
+    Parameters
+    ----------
+    dcs : float [..., n, H, W]
+        Samples in any one unit, n = 2 or 4.
+    offset_lsb : float [..., H, W], optional
+        Calibrated offset of each pixel, common to its samples, in the unit of the samples.
+
+    Raises
+    ------
+    ValueError
+        Another number of samples, another dtype, or a NaN or infinity; the message says where.
+    """
+    cosine, sine, amplitude, residual = quadratures(dcs, offset_lsb)
+    phase_rad = to_phase_(to_turns_(angle_of(cosine, sine)))
+    return PhaseFrame(phase_rad, amplitude, residual)
+
+
+def quadratures(
+    dcs: Tensor, offset_lsb: Tensor | None = None
+) -> tuple[Tensor, Tensor, Tensor, Tensor | None]:
+    """Cosine, sine, amplitude and residual, see `decode`, which says what is refused.
+
+    Written twice: a compiled loop where samples lie in memory, a chain of torch operations for
+    other devices, gradients and exported files. A test holds them together.
+    """
+    _check_kind(dcs)
+    return _by_loop(dcs, offset_lsb) if can_loop(dcs) else _by_torch(dcs, offset_lsb)
+
+
+def _by_torch(
+    dcs: Tensor, offset_lsb: Tensor | None
+) -> tuple[Tensor, Tensor, Tensor, Tensor | None]:
+    _check_values(dcs)
+    samples = dcs if offset_lsb is None else dcs - offset_lsb.unsqueeze(-3)
+    if samples.shape[-3] == 2:
+        cosine, sine = samples.unbind(-3)
+        return cosine, sine, _length(cosine, sine), None
+    first, second, third, fourth = samples.unbind(-3)
+    cosine, sine = first - third, second - fourth
+    residual = torch.maximum((first + third).abs(), (second + fourth).abs())
+    return cosine, sine, _length(cosine, sine) / 2, residual
+
+
+def _length(cosine: Tensor, sine: Tensor) -> Tensor:
+    """As `torch.hypot`, which files of networks do not know."""
+    return (cosine * cosine).addcmul(sine, sine).sqrt()
+
+
+def _by_loop(
+    dcs: Tensor, offset_lsb: Tensor | None
+) -> tuple[Tensor, Tensor, Tensor, Tensor | None]:
+    *leading, count, height, width = dcs.shape
+    samples, shape = dcs.reshape(-1, count, height, width), (*leading, height, width)
+    offset = array_of(0.0 if offset_lsb is None else offset_lsb, shape)
+    maps = np.empty((4, len(samples), height, width), np.float32)
+    if not decode_pixels(array(samples), offset.reshape(maps[0].shape), *maps):
+        _check_values(dcs)  # Which sample it was is only looked for where there is one.
+    cosine, sine, amplitude, residual = torch.from_numpy(maps).view(4, *shape).unbind()
+    return cosine, sine, amplitude, residual if count == 4 else None
+
+
+@loop
+def decode_pixels(
+    dcs: Array, offset: Array, cosine: Array, sine: Array, amplitude: Array, residual: Array
+) -> bool:
+    """Quadratures and strength of samples [B, n, H, W] less their offset [B, H, W]; all float32.
+
+    The maps [B, H, W] are written, `residual` only for four samples. False if a sample is NaN or
+    infinite.
+    """
+    four, finite = dcs.shape[1] == 4, True
+    frames, rows, columns = amplitude.shape
+    for b in range(frames):
+        for i in range(rows):
+            for j in range(columns):
+                common = offset[b, i, j]
+                x, y = dcs[b, 0, i, j] - common, dcs[b, 1, i, j] - common
+                scale = np.float32(1.0)
+                if four:
+                    third, fourth = dcs[b, 2, i, j] - common, dcs[b, 3, i, j] - common
+                    residual[b, i, j] = max(abs(x + third), abs(y + fourth))
+                    x, y, scale = x - third, y - fourth, HALF
+                squared = x * x + y * y
+                cosine[b, i, j], sine[b, i, j] = x, y
+                amplitude[b, i, j] = np.sqrt(squared) * scale
+                finite = finite & (squared - squared == ZERO)
+    return finite
+
+
+def angle_of(cosine: Tensor, sine: Tensor) -> Tensor:
+    """Phase in [-pi, pi]."""
+    return torch.atan2(sine, cosine)
+
+
+def to_turns_(phase_rad: Tensor) -> Tensor:
+    """Phases in [-pi, 2 pi) become turns in place, one more than they are, so none is negative."""
+    return phase_rad.mul_(1 / TWO_PI).add_(1)
+
+
+def to_phase_(turns: Tensor) -> Tensor:
+    """Turns that are not negative become their phase in [0, 2 pi), in place.
+
+    The largest float below one, times 2 pi, rounds to one below 2 pi.
+    """
+    return turns.frac_().mul_(TWO_PI)
+
+
+def _check_kind(dcs: Tensor) -> None:
+    if not dcs.is_floating_point():
+        raise ValueError(f"dcs is {dcs.dtype}; expected a floating-point tensor")
+    if dcs.ndim < 3 or dcs.shape[-3] not in (2, 4):
+        raise ValueError(f"dcs has shape {tuple(dcs.shape)}; expected [..., 2 or 4, H, W]")
+
+
+def _check_values(dcs: Tensor) -> None:
+    if torch.compiler.is_compiling():
+        return  # A graph, such as an exported one, is made before there are values.
+    # A sum is one pass and is finite unless a sample is not (or samples are absurdly large).
+    if not math.isfinite(dcs.sum()):
+        for name, wrong in (("NaN", dcs.isnan()), ("an infinity", dcs.isinf())):
+            if wrong.any():
+                raise ValueError(f"dcs holds {name} at {wrong.nonzero()[0].tolist()}")

@@ -1,0 +1,81 @@
+"""Which samples an acquisition takes: how many, at which frequency, in which order, when.
+
+This module and `unwrap.signal.decoding` are the only places that know the conventions of
+the samples. `D_k ~ m S cos(phi - k pi/2)`, k = 0..3, first at f1, then at f2, so
+that the 2- and 4-DCS acquisitions are prefixes of the 8-DCS one.
+"""
+
+from __future__ import annotations
+
+import enum
+
+SAMPLES_PER_FREQUENCY = 4
+
+
+class Shots(enum.IntEnum):
+    """Number of differential correlation samples (DCS) of one frame."""
+
+    TWO = 2
+    FOUR = 4
+    EIGHT = 8
+
+    @classmethod
+    def from_action(cls, action: int) -> Shots:
+        """Shots of an environment action: 0 = 2 DCS, 1 = 4 DCS, 2 = 8 DCS."""
+        return tuple(cls)[action]
+
+    @property
+    def action(self) -> int:
+        """Environment action that asks for these shots."""
+        return tuple(type(self)).index(self)
+
+
+def demodulation_phase_rad(sample: int) -> float:
+    """Phase theta_k of the demodulation signal of sample `sample` (0..7), in radians."""
+    return (sample % SAMPLES_PER_FREQUENCY) * 1.5707963267948966
+
+
+def frequency_index(sample: int) -> int:
+    """0 where sample `sample` (0..7) is taken at f1, 1 where it is taken at f2."""
+    return sample // SAMPLES_PER_FREQUENCY
+
+
+def sample_times_s(shots: int, sample_period_s: float) -> tuple[float, ...]:
+    """Start of each sample after the start of the frame, in seconds: t_k = k * period.
+
+    `sample_period_s` is integration time plus readout time.
+    """
+    return tuple(k * sample_period_s for k in range(int(shots)))
+
+
+def harmonic_weights(strength: float, highest: int) -> tuple[tuple[int, float], ...]:
+    """Odd harmonics of the correlation and their weights relative to the fundamental.
+
+    Square light times square demodulation correlates to a triangle, sum of cos(h phi) / h^2 over
+    odd h; `strength` scales what lies beyond the fundamental.
+
+    Parameters
+    ----------
+    strength : float
+        0 = pure sine, 1 = ideal squares.
+    highest : int
+        Highest harmonic kept, odd.
+
+    Raises
+    ------
+    ValueError
+        A strength outside 0..1, or a highest harmonic that is even or less than 1.
+
+    Examples
+    --------
+    >>> harmonic_weights(0.0, 7)
+    ((1, 1.0),)
+    >>> harmonic_weights(1.0, 3)
+    ((1, 1.0), (3, 0.1111111111111111))
+    """
+    if not 0.0 <= strength <= 1.0:
+        raise ValueError(f"strength is {strength}; expected 0 to 1")
+    if highest < 1 or highest % 2 == 0:
+        raise ValueError(f"highest is {highest}; expected an odd number of at least 1")
+    overtones = range(3, highest + 1, 2) if strength > 0 else ()
+    return ((1, 1.0), *((h, strength / h**2) for h in overtones))

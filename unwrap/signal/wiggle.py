@@ -1,0 +1,231 @@
+"""Calibration of the wiggle: a table of the phase error, measured at known distances.
+
+Square light and demodulation correlate to a triangle; its odd harmonics bend the decoded phase
+four times per period, by at most 0.0711 rad. Two and four samples bend alike, so that one table per
+modulation frequency serves both.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from unwrap.signal.decoding import (
+    BELOW_TWO_PI,
+    TWO_PI,
+    decode,
+    to_phase_,
+    to_turns_,
+)
+from unwrap.signal.frames import PhaseFrame
+from unwrap.signal.frequencies import unambiguous_range_m
+from unwrap.support import write_json
+
+BINS = 256
+LARGEST_FILE_BYTES = 2**20
+
+
+class Straight(NamedTuple):
+    """How an angle becomes turns without the stored phase error, float32; see `WiggleTable`.
+
+    Attributes
+    ----------
+    constant, slope : [n]
+        Turns at the place x of an angle in bins: constant + slope x, in the bin that holds x.
+    first, bins_per_rad
+        The place of an angle: first + bins_per_rad angle.
+    """
+
+    constant: np.ndarray
+    slope: np.ndarray
+    first: np.float32
+    bins_per_rad: np.float32
+
+
+@dataclass(frozen=True)
+class WiggleTable:
+    """Phase error of one modulation frequency by decoded phase.
+
+    Attributes
+    ----------
+    error_rad : tuple of float
+        Decoded minus true phase at the decoded phases i 2 pi / n, i = 0..n - 1; linear in between
+        and periodic.
+    """
+
+    error_rad: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.error_rad) < 4:
+            raise ValueError(f"error_rad has {len(self.error_rad)} entries; expected at least 4")
+        if not all(abs(error) <= math.pi for error in self.error_rad):  # False for NaN, too.
+            raise ValueError("error_rad holds NaN or more than pi; expected phase errors")
+
+    def scaled(self, share: float) -> WiggleTable:
+        """The table that removes `share` of what this one does."""
+        return WiggleTable(tuple(share * error for error in self.error_rad))
+
+    @cached_property
+    def _first(self) -> Tensor:
+        """Bins from the first line, at a phase of -pi or just below it, to phase 0."""
+        return torch.tensor((len(self.error_rad) + 1) // 2)
+
+    @cached_property
+    def _lines(self) -> Tensor:
+        """What `turns_of` gives, a + b x at the place x of a phase in bins: [2, bins] of a and b.
+
+        From -pi to 2 pi and a bin beyond, which is that of phases that round up.
+        """
+        count, first = len(self.error_rad), int(self._first)
+        place = torch.arange(first + count + 2, dtype=torch.float64)
+        errors = torch.tensor(self.error_rad, dtype=torch.float64).roll(first)
+        errors = errors[place.long() % count] / TWO_PI
+        turns = 1.0 + (place - first) / count - errors
+        slopes = turns.diff()
+        return torch.stack((turns[:-1] - slopes * place[:-1], slopes))
+
+    @cached_property
+    def straight(self) -> Straight:
+        """The same lines for the compiled loops."""
+        constant, slope = self._lines.to(torch.float32).numpy()
+        bins_per_rad = np.float32(len(self.error_rad) / TWO_PI)
+        return Straight(constant, slope, np.float32(int(self._first)), bins_per_rad)
+
+    def turns_of(self, phase_rad: Tensor) -> Tensor:
+        """Phases in [-pi, 2 pi) as turns without their error, one more, so none is negative."""
+        first, lines = self._first.to(phase_rad), self._lines.to(phase_rad)
+        place = torch.add(first, phase_rad, alpha=len(self.error_rad) / TWO_PI).flatten()
+        constant, slope = lines.index_select(1, place.to(torch.int32)).unbind(0)
+        return torch.addcmul(constant, slope, place).view(phase_rad.shape)
+
+    def corrected(self, frame: PhaseFrame) -> PhaseFrame:
+        """`frame` with the phase error removed."""
+        return replace(frame, phase_rad=to_phase_(self.turns_of(frame.phase_rad)))
+
+
+FLAT = WiggleTable((0.0,) * 4)
+"""No phase error."""
+
+
+def shifted(frame: PhaseFrame, shift_m: Tensor, frequency_hz: float) -> PhaseFrame:
+    """`frame` [B, H, W] with `shift_m` [B] added to its distances, which wrap.
+
+    What a delay does to the samples of a sine, 4 pi f shift / c on the phase.
+    """
+    turns = shift_turns_(to_turns_(frame.phase_rad.clone()), shift_m, frequency_hz)
+    return replace(frame, phase_rad=to_phase_(turns))
+
+
+def shift_turns_(turns: Tensor, shift_m: Tensor, frequency_hz: float) -> Tensor:
+    """Turns [B, H, W] are advanced, in place, by distances `shift_m` [B], up to whole turns."""
+    range_m = unambiguous_range_m(frequency_hz)
+    return turns.add_(shift_m.remainder(range_m).to(turns).view(-1, 1, 1), alpha=1 / range_m)
+
+
+def wrapped(phase_rad: Tensor) -> Tensor:
+    """Phase in [0, 2 pi); the clamp catches what adding 2 pi rounds up."""
+    turns = phase_rad.mul(1 / TWO_PI).floor_()
+    return phase_rad.add(turns, alpha=-TWO_PI).clamp_(0.0, BELOW_TWO_PI)
+
+
+def measure_wiggle(decoded_rad: Tensor, true_rad: Tensor, *, bins: int = BINS) -> WiggleTable:
+    """Table from a calibration bench: phases decoded at known distances over one period.
+
+    The periodic, piecewise linear curve that fits the errors best in the sense of least squares,
+    so that noise averages out. A constant error, the sensor's own delay, is part of the table.
+
+    Parameters
+    ----------
+    decoded_rad, true_rad : float, of one shape
+        Decoded phases, and 4 pi f d / c of the known distances.
+
+    Raises
+    ------
+    ValueError
+        Unequal shapes, a NaN, or a part of the period without measurements.
+    """
+    if decoded_rad.shape != true_rad.shape:
+        raise ValueError(
+            f"true_rad has shape {tuple(true_rad.shape)}; expected that of decoded_rad, "
+            f"{tuple(decoded_rad.shape)}"
+        )
+    decoded, true = decoded_rad.double().flatten(), true_rad.double().flatten()
+    error = torch.remainder(decoded - true + math.pi, TWO_PI) - math.pi
+    if not bool(error.isfinite().all()):
+        raise ValueError("decoded_rad or true_rad holds NaN or infinity")
+    place = torch.remainder(decoded, TWO_PI) * (bins / TWO_PI)
+    left = place.long().remainder(bins)
+    _require_every_bin(left, bins)
+    # Normal equations of the hat functions: each measurement touches its two neighbours.
+    right, share = (left + 1) % bins, place - place.floor()
+    sides = ((left, 1.0 - share), (right, share))
+    matrix, target = torch.zeros(bins * bins).double(), torch.zeros(bins).double()
+    for row, weight in sides:
+        target.index_add_(0, row, weight * error)
+        for column, other in sides:
+            matrix.index_add_(0, row * bins + column, weight * other)
+    solution = torch.linalg.solve(matrix.view(bins, bins), target)
+    return WiggleTable(tuple(solution.tolist()))
+
+
+def _require_every_bin(index: Tensor, bins: int) -> None:
+    empty = (torch.bincount(index, minlength=bins) == 0).nonzero().flatten().tolist()
+    if empty:
+        degrees = 360 / bins
+        raise ValueError(
+            f"{len(empty)} of {bins} bins hold no measurement, the first from "
+            f"{empty[0] * degrees:.1f} to {(empty[0] + 1) * degrees:.1f} degrees; measure there or "
+            "take fewer bins"
+        )
+
+
+def correlation_samples(phase_rad: Tensor, weights: Sequence[tuple[int, float]]) -> Tensor:
+    """Four samples [4, ...] at the given phases: the sum of w_h cos(h (phi - k pi / 2)).
+
+    `weights` are those of `unwrap.signal.shots.harmonic_weights`.
+    """
+    angles = torch.stack([phase_rad - k * (math.pi / 2) for k in range(4)])
+    return torch.stack([weight * torch.cos(h * angles) for h, weight in weights]).sum(dim=0)
+
+
+def wiggle_of(weights: Sequence[tuple[int, float]], *, bins: int = BINS) -> WiggleTable:
+    """Table that a noise-free bench would measure of a correlation with these harmonics."""
+    true_rad = torch.arange(32 * bins, dtype=torch.float64) * (TWO_PI / (32 * bins))
+    samples = correlation_samples(true_rad, weights)
+    return measure_wiggle(decode(samples.unsqueeze(-2)).phase_rad[0], true_rad, bins=bins)
+
+
+def write_wiggle(path: Path, tables: Mapping[float, WiggleTable]) -> None:
+    """Store the tables of a sensor, by modulation frequency in Hz, as JSON."""
+    rows = [{"frequency_hz": hz, "error_rad": t.error_rad} for hz, t in tables.items()]
+    write_json(path, {"wiggle": rows})
+
+
+def read_wiggle(path: Path) -> dict[float, WiggleTable]:
+    """Tables by modulation frequency in Hz.
+
+    Raises
+    ------
+    ValueError
+        The file is missing, too large, or no wiggle table; the message names it.
+    """
+    try:
+        if path.stat().st_size > LARGEST_FILE_BYTES:
+            raise ValueError(f"larger than {LARGEST_FILE_BYTES} bytes")
+        rows = json.loads(path.read_text(encoding="utf-8"))["wiggle"]
+        return {float(row["frequency_hz"]): _table(row["error_rad"]) for row in rows}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise ValueError(f"{path} is no wiggle table: {error!r}") from None
+
+
+def _table(values: Sequence[float]) -> WiggleTable:
+    return WiggleTable(tuple(float(value) for value in values))

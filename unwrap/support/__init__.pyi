@@ -1,0 +1,24 @@
+from .compiled import (
+    array as array,
+    array_of as array_of,
+    can_loop as can_loop,
+    inlined as inlined,
+    loop as loop,
+)
+from .files import write_bytes as write_bytes, write_json as write_json, write_text as write_text
+from .progress_bar import progress as progress, say as say
+from .section import (
+    Fraction as Fraction,
+    NonNegative as NonNegative,
+    Positive as Positive,
+    Range as Range,
+    Section as Section,
+    check_range as check_range,
+)
+from .tensors import (
+    concatenate as concatenate,
+    mapped as mapped,
+    on_device as on_device,
+    put as put,
+    take as take,
+)

@@ -1,0 +1,9 @@
+from .config import TrainConfig as TrainConfig
+from .data import (
+    acquiring_threads as acquiring_threads,
+    in_order as in_order,
+    loader as loader,
+    training_device as training_device,
+)
+from .loop import JUDGED_DRAW as JUDGED_DRAW, train as train
+from .splits import RANDOM_SPLITS as RANDOM_SPLITS, random_split as random_split

@@ -1,0 +1,120 @@
+"""How a network is trained: one typed configuration, a sentence per field."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import torch
+from pydantic import BaseModel, ConfigDict, Field
+
+from unwrap.networks import (
+    LossWeights,
+    Network,
+    NetworkName,
+    Settings,
+    build,
+    load_unwrapper,
+    network_class,
+)
+from unwrap.signal import Shots
+from unwrap.training.data import Augmentation, SplitBy
+
+
+class TrainConfig(BaseModel):
+    """Training of an unwrapping network."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    network: NetworkName = Field("tofregnet", description="which network")
+    bank: str = Field("training", description="name or path of the bank to train on")
+    split_by: SplitBy = Field(
+        "clip", description="whole clips, or the paper's random split of frames"
+    )
+    sensor: str = Field("epc660", description="name or path of the sensor that looks at the bank")
+    truth: Literal["rendered", "measured"] = Field(
+        "rendered", description="learn the rendered distance, or the sensor's own of 8 DCS"
+    )
+    stride: int = Field(1, ge=1, le=8, description="every how many rows and columns are used")
+    shots: tuple[Shots, ...] = Field(
+        (Shots.TWO, Shots.FOUR), description="samples that a network which looks at them is given"
+    )
+    memory: bool = Field(False, description="give toffusionnet the depth of the frame before")
+    width: int = Field(32, ge=4, le=128, description="channels of the first ResNet stage")
+    classes: int = Field(5, ge=2, le=16, description="wrap classes of tofsegnet")
+    f1_hz: float = Field(24e6, gt=0, description="frequency whose wraps are predicted, Hz")
+    max_range_m: float = Field(25.0, gt=0, description="range that is scored, m")
+    clamp_m: float = Field(30.0, gt=0, description="truth beyond, and the sky, counts as this, m")
+    epochs: int = Field(40, ge=1, description="passes over the training frames")
+    batch_size: int = Field(32, ge=1, description="frames per step")
+    learning_rate: float = Field(3e-3, gt=0, description="highest learning rate")
+    final_learning_rate: float = Field(1e-6, ge=0, description="learning rate at the last step")
+    warmup_share: float = Field(0.1, ge=0, lt=1, description="share of steps that rise linearly")
+    weight_decay: float = Field(0.01, ge=0, description="decoupled decay; 0 is plain Adam")
+    clip_norm: float = Field(
+        0.0, ge=0, description="longest gradient; longer ones are shortened; 0 leaves all"
+    )
+    equation_7_weight: float = Field(1.0, ge=0, description="weight of the paper's loss, eq. 7")
+    equation_7_mean_share: float = Field(
+        0.85, ge=0, le=1, description="lambda of L_SI; the paper's 1 leaves the mean error free"
+    )
+    wrap_weight: float = Field(1.0, ge=0, description="weight of our wrap loss; 0 as in the paper")
+    flip_horizontal: bool = Field(True, description="mirror left and right")
+    flip_vertical: bool = Field(False, description="mirror up and down, as the paper does too")
+    contrast: float = Field(0.2, ge=0, description="largest relative change of gamma")
+    brightness: float = Field(0.3, ge=0, description="largest relative change of gain")
+    seed: int = Field(0, ge=0, description="seed of weights, order and augmentation")
+    start_from: str | None = Field(
+        None, description="name or path of a network whose layers of equal shape are taken over"
+    )
+
+    @property
+    def settings(self) -> Settings:
+        """What the network is built from."""
+        return Settings(self.width, self.clamp_m, self.classes, self.f1_hz)
+
+    @property
+    def shown_shots(self) -> tuple[Shots, ...]:
+        """Samples that frames come with; none where the network looks at the gray image alone."""
+        return self.shots if network_class(self.network).needs == "samples" else ()
+
+    @property
+    def loss_weights(self) -> LossWeights:
+        """How the terms of a regression loss count."""
+        return LossWeights(self.equation_7_weight, self.equation_7_mean_share, self.wrap_weight)
+
+    @property
+    def augmentation(self) -> Augmentation:
+        """How training images are varied."""
+        return Augmentation(
+            self.flip_horizontal, self.flip_vertical, self.contrast, self.brightness
+        )
+
+    def build(self) -> Network:
+        """The network, with weights drawn from `seed`."""
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(self.seed)
+            network = build(self.network, self.settings)
+        if self.start_from is not None:
+            take_over(network, load_unwrapper(self.start_from).network)
+        return network
+
+
+def take_over(network: Network, other: Network) -> None:
+    """Copy the layers of `other` that have the same name and shape in `network`.
+
+    Raises
+    ------
+    ValueError
+        There is none, as the widths differ.
+    """
+    own = network.state_dict()
+    shared = {
+        name: tensor
+        for name, tensor in other.state_dict().items()
+        if name in own and own[name].shape == tensor.shape and tensor.ndim > 0
+    }
+    if not shared:
+        raise ValueError(
+            f"start_from has width {other.settings.width}; expected {network.settings.width}"
+        )
+    network.load_state_dict({**own, **shared})
