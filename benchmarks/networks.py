@@ -17,8 +17,8 @@ from torch import Tensor
 
 from benchmarks.rows import row
 from benchmarks.turns import alternately
-from unwrap.networks.base import Settings, arithmetic
 from unwrap.networks.engines import Prepared
+from unwrap.networks.network import Settings, arithmetic
 from unwrap.networks.predictor import Unwrapper, load_unwrapper
 from unwrap.networks.registry import build
 from unwrap.networks.weight_files import save_weights

@@ -1,3 +1,3 @@
 from .agent import AgentConfig as AgentConfig
 from .demo import DemoConfig as DemoConfig
-from .study import StudyConfig as StudyConfig
+from .study_config import StudyConfig as StudyConfig

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from agents.config.agent import AgentConfig
-from agents.config.study import StudyConfig
+from agents.config.study_config import StudyConfig
 from shotenv.config import EnvConfig
 from unwrap.support import Section
 

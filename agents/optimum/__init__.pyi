@@ -7,5 +7,5 @@ from .choices import (
     tuned_rule as tuned_rule,
 )
 from .dynamic import clairvoyant as clairvoyant, greedy as greedy
-from .table import DriveTable as DriveTable, Played as Played, play as play
+from .outcome_table import DriveTable as DriveTable, Played as Played, play as play
 from .tabulation import Possible as Possible, drive_of as drive_of, tabulate as tabulate

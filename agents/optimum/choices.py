@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from agents.optimum.table import (
+from agents.optimum.outcome_table import (
     Choice,
     DriveTable,
     Name,

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from agents.optimum.table import (
+from agents.optimum.outcome_table import (
     DriveTable,
     Laser,
     Played,

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.utils import seeding
 from torch import Tensor
 
-from agents.optimum.table import Advance, DriveTable, Laser
+from agents.optimum.outcome_table import Advance, DriveTable, Laser
 from agents.policies import SNR_FEATURE
 from shotenv.config import LaserConfig, RewardConfig
 from shotenv.decision import (

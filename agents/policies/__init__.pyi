@@ -1,4 +1,3 @@
-from .base import Action as Action, Observation as Observation, Policy as Policy
 from .fixed import (
     CyclePolicy as CyclePolicy,
     FixedPolicy as FixedPolicy,
@@ -15,4 +14,5 @@ from .learned import (
     load_policy as load_policy,
     network_arguments as network_arguments,
 )
+from .policy import Action as Action, Observation as Observation, Policy as Policy
 from .rules import SNR_FEATURE as SNR_FEATURE, SnrThresholdPolicy as SnrThresholdPolicy

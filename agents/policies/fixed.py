@@ -11,7 +11,7 @@ from unwrap.signal import Shots
 
 if TYPE_CHECKING:
     pass
-from agents.policies.base import (
+from agents.policies.policy import (
     Action,
     Observation,
     Policy,

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     pass
 import torch
 
-from agents.policies.base import Action, Observation, Policy, single
+from agents.policies.policy import Action, Observation, Policy, single
 from shotenv.config import EnvConfig
 from shotenv.decision import heat_margin_k
 from shotenv.laser import laser_step, shot_cost, start_laser

@@ -16,7 +16,7 @@ from unwrap.signal import Shots
 
 if TYPE_CHECKING:
     from stable_baselines3.common.policies import ActorCriticPolicy
-from agents.policies.base import Action, Observation, Policy, single
+from agents.policies.policy import Action, Observation, Policy, single
 
 AGENT_SCHEMA: Final = 2
 

@@ -11,7 +11,7 @@ from shotenv.decision import feature_index
 
 if TYPE_CHECKING:
     pass
-from agents.policies.base import Action, Observation, Policy, checked_shots, single
+from agents.policies.policy import Action, Observation, Policy, checked_shots, single
 
 SNR_FEATURE: Final = "signal_to_noise"
 

@@ -23,7 +23,7 @@ from figures.stage import (
 from shotenv.laser.ageing import ageing_rate
 from shotenv.laser.cost import ENERGY_PARTS, ShotCost
 from shotenv.laser.energy import efficiency_at, emitted_power_w, shot_cost
-from shotenv.laser.state import laser_step, start_laser
+from shotenv.laser.laser_state import laser_step, start_laser
 from unwrap import load_unwrapper
 
 PERIOD_S, AMBIENT_K = 0.1, 307.15

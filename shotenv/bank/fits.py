@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shotenv.bank.reader import Bank
+from shotenv.bank.frames_reader import Bank
 from shotenv.config import SensorConfig
 
 RENDERED_WITH = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from shotenv.bank.build import bank_bytes, bank_folder, clips_standing, rendering_minutes
-from shotenv.bank.reader import Bank
+from shotenv.bank.frames_reader import Bank
 from shotenv.bank.store import MANIFEST, frame_bytes
 from shotenv.config import BankConfig, configs_dir, read_config
 

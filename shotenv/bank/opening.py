@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shotenv.bank.reader import Bank
+from shotenv.bank.frames_reader import Bank
 from shotenv.bank.store import MANIFEST, BankError
 from shotenv.config import BankConfig, ConfigError, find_config, read_config
 

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from shotenv.bank.reader import Bank, Clip
+from shotenv.bank.frames_reader import Bank, Clip
 from shotenv.bank.store import BankError
 from shotenv.config import SensorConfig
 from shotenv.sensor import full_scale_lsb

@@ -21,7 +21,7 @@ import torch
 from torch import Tensor
 
 from shotenv.bank.build import cache_dir
-from shotenv.bank.reader import Bank
+from shotenv.bank.frames_reader import Bank
 from shotenv.bank.store import sha256_of
 from unwrap.networks import Prediction, Unwrapper
 from unwrap.support import progress, write_json

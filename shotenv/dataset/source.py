@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from shotenv.bank import open_bank
 from shotenv.config import env_config
-from shotenv.dataset.frames import SensedFrames
+from shotenv.dataset.sensed_frames import SensedFrames
 from unwrap.training import TrainConfig
 
 

@@ -13,7 +13,7 @@ from .features import (
     feature_index as feature_index,
     heat_margin_k as heat_margin_k,
 )
-from .observe import observe as observe
+from .observation import observe as observe
 from .outcomes import Outcomes as Outcomes, outcomes_of_all_actions as outcomes_of_all_actions
 from .problem import Problem as Problem, open_problem as open_problem
 from .recall import Recall as Recall

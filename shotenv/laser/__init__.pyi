@@ -4,7 +4,7 @@ from .energy import (
     emitted_power_w as emitted_power_w,
     shot_cost as shot_cost,
 )
-from .state import (
+from .laser_state import (
     LaserState as LaserState,
     laser_step as laser_step,
     start_laser as start_laser,

@@ -1,4 +1,4 @@
-"""Imports point one way, and heavy packages are imported only where they belong."""
+"""The house: imports point one way, through doors, and heavy packages stay where they belong."""
 
 from __future__ import annotations
 
@@ -10,69 +10,214 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-ROOMS = {"unwrap": {"unwrap"}, "shotenv": {"unwrap", "shotenv"}}
-ROOMS["agents"] = {"unwrap", "shotenv", "agents"}
+LONGEST_FILE, LARGEST_ROOM = 350, 13
+"""Lines of a file; files of a room."""
+
+# What each room may import, besides itself: rooms further up in this table, by their doors.
+ROOMS: dict[str, set[str]] = {}
+
+
+def room(name: str, *imports: str) -> None:
+    unknown = set(imports) - set(ROOMS)
+    assert not unknown, f"{name} imports {unknown}, which stand below it"
+    ROOMS[name] = set(imports)
+
+
+SIGNAL = ("unwrap.support", "unwrap.signal")
+UNWRAPPING = (*SIGNAL, "unwrap.depth", "unwrap.networks")
+room("unwrap.support")
+room("unwrap.pictures")
+room("unwrap.signal", "unwrap.support")
+room("unwrap.depth", *SIGNAL)
+room("unwrap.networks", *SIGNAL, "unwrap.depth")
+room("unwrap.networks.peers", *UNWRAPPING)
+room("unwrap.training", *UNWRAPPING)
+room("unwrap.recordings", *UNWRAPPING, "unwrap.pictures")
+room("unwrap.export", *UNWRAPPING, "unwrap.training")
+room("unwrap.comparison", *UNWRAPPING, "unwrap.training", "unwrap.pictures")
+room("unwrap", *UNWRAPPING)
+
+LIGHT = ("shotenv.config", "shotenv.world.geometry", "shotenv.world")
+SENSING = ("shotenv.config", "shotenv.sensor", "shotenv.laser", "shotenv.bank")
+room("shotenv.config", *SIGNAL)
+room("shotenv.world.geometry", "unwrap.support", "shotenv.config")
+room("shotenv.world.things", "shotenv.world.geometry")
+room(
+    "shotenv.world.families",
+    "unwrap.support",
+    "shotenv.config",
+    "shotenv.world.geometry",
+    "shotenv.world.things",
+)
+room(
+    "shotenv.world",
+    "unwrap.support",
+    "shotenv.config",
+    "shotenv.world.geometry",
+    "shotenv.world.families",
+)
+room("shotenv.render.backend")
+room(
+    "shotenv.render", *SIGNAL, "shotenv.config", "shotenv.world.geometry", "shotenv.render.backend"
+)
+room("shotenv.sensor", *SIGNAL, "shotenv.config")
+room("shotenv.laser", "shotenv.config")
+room(
+    "shotenv.bank",
+    *UNWRAPPING,
+    "unwrap.training",
+    "unwrap.pictures",
+    *LIGHT,
+    "shotenv.render",
+    "shotenv.render.backend",
+    "shotenv.sensor",
+)
+room("shotenv.decision", *UNWRAPPING, *SENSING)
+room("shotenv.env", *SIGNAL, "unwrap.pictures", *SENSING, "shotenv.decision")
+room(
+    "shotenv.dataset", *UNWRAPPING, "unwrap.training", "unwrap.export", *SENSING, "shotenv.decision"
+)
+room("shotenv", "shotenv.bank", "shotenv.config", "shotenv.sensor", "shotenv.env")
+
+ENVIRONMENT = ("shotenv.config", "shotenv.laser", "shotenv.decision", "shotenv.env")
+room("agents.config", "unwrap.support", "shotenv.config")
+room("agents.policies", *SIGNAL, *ENVIRONMENT, "agents.config")
+room("agents.optimum", *SIGNAL, *ENVIRONMENT, "agents.policies")
+PLAYING = (*SIGNAL, *ENVIRONMENT, "agents.config", "agents.policies", "agents.optimum")
+room("agents.evaluation", *PLAYING)
+room("agents.training", *PLAYING, "agents.evaluation")
+room("agents.report", *PLAYING, "unwrap.pictures", "agents.evaluation")
+room("agents", "agents.policies", "agents.training")
+room("agents.cli", *ROOMS)
+
 ONLY_IN = {
     "mitsuba": "shotenv/render/",
     "drjit": "shotenv/render/",
-    "trimesh": ("shotenv/world/", "agents/"),
+    "trimesh": ("shotenv/world/", "unwrap/recordings/"),
     "stable_baselines3": "agents/",
-    "lightning": "unwrap/",
-    "numba": "unwrap/compiled.py",
-    "plotly": "agents/",
-    "PIL": ("shotenv/", "agents/"),
-    "onnx": "agents/",
-    "openvino": "unwrap/program.py",
-    "onnxruntime": "agents/",
+    "lightning": "unwrap/training/",
+    "numba": "unwrap/support/compiled.py",
+    "plotly": "agents/report/",
+    "jinja2": ("agents/report/", "unwrap/comparison/"),
+    "PIL": ("unwrap/pictures/", "unwrap/recordings/", "unwrap/comparison/", "shotenv/"),
+    "onnx": "unwrap/export/",
+    "onnxruntime": "unwrap/export/",
+    "openvino": "unwrap/networks/",
+}
+SOURCES = sorted(
+    path.relative_to(ROOT).as_posix()
+    for house in ("unwrap", "shotenv", "agents")
+    for path in (ROOT / house).rglob("*.py")
+)
+MODULES = {
+    source.removesuffix(".py").replace("/", ".").removesuffix(".__init__") for source in SOURCES
 }
 
 
-def modules_imported_by(path: Path) -> set[str]:
-    names = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+def room_of(source: str) -> str:
+    return source.rpartition("/")[0].replace("/", ".")
+
+
+def imports_of(source: str):
+    """(module, name) of every import of a file; the name is empty in `import module`."""
+    for node in ast.walk(ast.parse((ROOT / source).read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
+            yield from ((alias.name, "") for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: relative import"
-            names.add(node.module or "")
-    return names
-
-
-SOURCES = sorted(
-    path.relative_to(ROOT).as_posix() for room in ROOMS for path in (ROOT / room).rglob("*.py")
-)
+            assert node.level == 0, f"{source}: relative import"
+            yield from ((node.module or "", alias.name) for alias in node.names)
 
 
 @pytest.mark.parametrize("source", SOURCES)
-def test_imports_stay_within_the_table(source):
-    room = source.split("/")[0]
-    for module in modules_imported_by(ROOT / source):
-        package = module.split(".")[0]
-        if package in ROOMS:
-            assert package in ROOMS[room], f"{source} imports {module}"
+def test_imports_stay_within_the_table_and_go_through_doors(source):
+    own = room_of(source)
+    for module, name in imports_of(source):
+        package = module.partition(".")[0]
+        if package in ("unwrap", "shotenv", "agents"):
+            inside = module in MODULES and module not in ROOMS
+            target = module.rpartition(".")[0] if inside else module
+            if target == own:
+                continue
+            assert target in ROOMS[own], f"{source} imports {module}, which {own} may not"
+            assert not inside, f"{source} reaches behind the door of {target}: {module}.{name}"
         if package in ONLY_IN:
             assert source.startswith(ONLY_IN[package]), f"{source} imports {module}"
 
 
-def test_world_knows_no_renderer_and_no_sensor():
+def test_no_module_imports_itself_round_corners():
+    """No cycles between files, where imports inside functions do not count."""
+    graph = {}
     for source in SOURCES:
-        if source.startswith("shotenv/world/"):
-            ours = {m for m in modules_imported_by(ROOT / source) if m.startswith("shotenv")}
-            assert all(m.startswith(("shotenv.world", "shotenv.config.sections")) for m in ours), (
-                source
-            )
+        body = ast.parse((ROOT / source).read_text(encoding="utf-8")).body
+        graph[source] = {
+            node.module.replace(".", "/") + ".py"
+            for node in body
+            if isinstance(node, ast.ImportFrom)
+        }
+    reached = {source: {source} for source in SOURCES}
+    for source in SOURCES:
+        waiting = list(graph[source])
+        while waiting:
+            following = waiting.pop()
+            assert following != source, f"{source} imports itself in the end"
+            if following in graph and following not in reached[source]:
+                reached[source].add(following)
+                waiting += graph[following]
+
+
+def test_every_room_is_in_the_table_and_says_what_it_is_for():
+    assert {room_of(source) for source in SOURCES} == set(ROOMS)
+    for name in ROOMS:
+        door = ROOT / name.replace(".", "/") / "__init__.py"
+        words = ast.get_docstring(ast.parse(door.read_text(encoding="utf-8")))
+        assert words and words.splitlines()[0].endswith("."), f"{name} does not say what it is for"
+        assert door.with_suffix(".pyi").is_file() or name == "unwrap.networks.peers"
+
+
+def test_what_a_door_names_can_be_had_and_hides_no_file():
+    """A name like a file's would be the file or the thing, by the order of imports."""
+    for name in ROOMS:
+        door = ROOT / name.replace(".", "/") / "__init__.pyi"
+        if not door.is_file():
+            continue
+        package = __import__(name, fromlist=["*"])
+        files = {path.stem for path in door.parent.iterdir()}
+        for node in ast.parse(door.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ImportFrom):
+                for alias in node.names:
+                    assert hasattr(package, alias.name), f"{name}.{alias.name}"
+                    assert node.module is None or alias.name not in files, f"{name}.{alias.name}"
+
+
+def test_no_name_stands_for_two_files():
+    """But for what means the same in its room."""
+    same = {
+        "__init__",
+        "__main__",
+        "config",
+        "frames",
+        "description",
+        "page",
+        "bank",
+        "sensor",
+        "laser",
+    }
+    names = [Path(source).stem for source in SOURCES]
+    assert sorted({name for name in names if names.count(name) > 1} - same) == []
 
 
 @pytest.mark.parametrize(
     ("package", "heavy"),
     [
+        ("unwrap", ("torch", "numba", "lightning")),
         ("shotenv", ("torch", "numba", "mitsuba", "drjit", "stable_baselines3")),
         ("agents", ("torch", "mitsuba", "stable_baselines3", "plotly")),
         (
             "agents.cli.entry",
             ("torch", "numba", "mitsuba", "stable_baselines3", "plotly", "onnx", "trimesh"),
         ),
-        ("shotenv.config.sections", ("torch", "numba", "mitsuba")),
+        ("shotenv.config.env", ("torch", "numba", "mitsuba")),
+        ("shotenv.render.frame", ("torch", "mitsuba")),
     ],
 )
 def test_import_is_light(package, heavy):
@@ -81,6 +226,8 @@ def test_import_is_light(package, heavy):
     assert done.stdout.strip() == "[]"
 
 
-def test_no_file_grows_beyond_one_subject():
-    long = {s: n for s in SOURCES if (n := len((ROOT / s).read_text().splitlines())) > 450}
+def test_files_and_rooms_keep_to_one_subject():
+    long = {s: n for s in SOURCES if (n := len((ROOT / s).read_text().splitlines())) > LONGEST_FILE}
     assert not long
+    files = [room_of(source) for source in SOURCES if not source.endswith("__init__.py")]
+    assert not {name: n for name in ROOMS if (n := files.count(name)) > LARGEST_ROOM}

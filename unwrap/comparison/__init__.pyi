@@ -1,2 +1,2 @@
 from .plan import TableConfig as TableConfig
-from .table import make_table as make_table
+from .results_table import make_table as make_table

@@ -12,7 +12,7 @@ from torch import Tensor
 from shotenv.config import SensorConfig, env_config
 from shotenv.sensor import describe
 from unwrap.depth import Merge, nearest_wraps
-from unwrap.export.frames import ExportFrames, choose_bank, export_frames
+from unwrap.export.export_frames import ExportFrames, choose_bank, export_frames
 from unwrap.export.onnx_files import OPSET, exported, quantised, run, run_torch, to_onnx
 from unwrap.networks import Unwrapper, load_unwrapper
 from unwrap.signal import Shots, unambiguous_range_m

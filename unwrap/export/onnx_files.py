@@ -14,7 +14,7 @@ import torch
 from torch import Tensor, nn
 
 from unwrap.depth import RULES, Merge
-from unwrap.export.frames import ExportFrames
+from unwrap.export.export_frames import ExportFrames
 from unwrap.networks import Needs, Prediction, Unwrapper, predicted
 from unwrap.signal import (
     GRAY_FULL_SCALE,

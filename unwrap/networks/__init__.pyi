@@ -7,15 +7,6 @@ from .autoencoder import (
     pad as pad,
     wrap_classes as wrap_classes,
 )
-from .base import (
-    Needs as Needs,
-    Network as Network,
-    NetworkName as NetworkName,
-    Prediction as Prediction,
-    Settings as Settings,
-    autocast as autocast,
-)
-from .features import compressed as compressed
 from .losses import (
     LossWeights as LossWeights,
     depth_guided_loss as depth_guided_loss,
@@ -23,6 +14,15 @@ from .losses import (
     scale_invariant_loss as scale_invariant_loss,
     ssim_loss as ssim_loss,
 )
+from .network import (
+    Needs as Needs,
+    Network as Network,
+    NetworkName as NetworkName,
+    Prediction as Prediction,
+    Settings as Settings,
+    autocast as autocast,
+)
+from .phase_maps import compressed as compressed
 from .predictor import Unwrapper as Unwrapper, load_unwrapper as load_unwrapper
 from .registry import build as build, network_class as network_class
 from .sizes import predicted as predicted

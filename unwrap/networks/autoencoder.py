@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from unwrap.networks.base import Network, Settings
+from unwrap.networks.network import Network, Settings
 from unwrap.signal import Sensed, SensorDescription
 
 STRIDE = 32

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from unwrap.networks.base import Network, arithmetic, autocast, multiply_accumulates
+from unwrap.networks.network import Network, arithmetic, autocast, multiply_accumulates
 from unwrap.networks.openvino import Program, can_compile
 
 Convolution = nn.Conv2d | nn.ConvTranspose2d

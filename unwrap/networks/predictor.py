@@ -10,8 +10,8 @@ import torch
 from torch import Tensor
 
 from unwrap.depth import Merge, correct
-from unwrap.networks.base import Network, Prediction, multiply_accumulates
 from unwrap.networks.engines import Prepared, torch_threads
+from unwrap.networks.network import Network, Prediction, multiply_accumulates
 from unwrap.networks.registry import NAMES
 from unwrap.networks.sizes import predicted, stride_to, trained_size
 from unwrap.networks.weight_files import load_weights

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import get_args
 
-from unwrap.networks.base import Network, NetworkName, Settings
+from unwrap.networks.network import Network, NetworkName, Settings
 
 NAMES: tuple[str, ...] = get_args(NetworkName)
 _PLACES = {

@@ -14,7 +14,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from unwrap.depth import nearest_wraps
-from unwrap.networks.base import Needs, Network, Prediction
+from unwrap.networks.network import Needs, Network, Prediction
 from unwrap.signal import Sensed, SensorDescription, measured, unambiguous_range_m
 from unwrap.support import mapped
 

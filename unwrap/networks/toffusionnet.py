@@ -24,9 +24,9 @@ from torch.nn import functional
 
 from unwrap.depth import fit_temperature, nearest_wraps
 from unwrap.networks.autoencoder import IGNORED, Autoencoder, convolution, describe, pad
-from unwrap.networks.base import Needs, Prediction, Settings, autocast
-from unwrap.networks.features import phase_maps
 from unwrap.networks.losses import LossWeights
+from unwrap.networks.network import Needs, Prediction, Settings, autocast
+from unwrap.networks.phase_maps import phase_maps
 from unwrap.signal import Memory, Sensed, SensorDescription, Shots, Truth, measured, samples_of
 
 FEATURES = 9

@@ -10,8 +10,8 @@ from torch import Tensor
 from unwrap.networks.autoencoder import (
     GrayNetwork,
 )
-from unwrap.networks.base import Prediction, Settings
 from unwrap.networks.losses import LossWeights, regression_loss, wrap_loss
+from unwrap.networks.network import Prediction, Settings
 from unwrap.signal import Sensed, SensorDescription, Truth
 
 

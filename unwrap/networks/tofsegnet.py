@@ -13,8 +13,8 @@ from unwrap.networks.autoencoder import (
     class_depth_m,
     wrap_classes,
 )
-from unwrap.networks.base import Prediction, Settings
 from unwrap.networks.losses import LossWeights
+from unwrap.networks.network import Prediction, Settings
 from unwrap.signal import Sensed, SensorDescription, Truth
 
 

@@ -18,7 +18,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor, nn
 
-from unwrap.networks.base import Network, Settings
+from unwrap.networks.network import Network, Settings
 from unwrap.networks.registry import build
 from unwrap.networks.sizes import trained_size
 from unwrap.support import write_bytes

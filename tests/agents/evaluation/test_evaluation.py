@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from agents.config.demo import DemoConfig
-from agents.config.study import StudyConfig
+from agents.config.study_config import StudyConfig
 from agents.evaluation.headroom import measure_problem
 from agents.evaluation.play import FIXED, Played, play_drives
 from agents.evaluation.study import (
@@ -17,7 +17,7 @@ from agents.evaluation.study import (
 from agents.evaluation.summary import best_fixed, best_rival, difference, summary
 from agents.optimum.choices import threshold, tuned_rule
 from agents.optimum.dynamic import clairvoyant
-from agents.optimum.table import play
+from agents.optimum.outcome_table import play
 from agents.optimum.tabulation import tabulate
 from agents.policies.fixed import FixedPolicy, RandomPolicy
 from agents.policies.guard import ThermalGuard

@@ -14,7 +14,7 @@ from agents.optimum.choices import (
     threshold_choices,
 )
 from agents.optimum.dynamic import clairvoyant, greedy
-from agents.optimum.table import DriveTable, Laser, Situation, play
+from agents.optimum.outcome_table import DriveTable, Laser, Situation, play
 
 TRIP_K, RELEASE_K, AMBIENT_K, DECAY = 330.0, 325.0, 300.0, 0.7
 JUNCTION_DECAY = 0.4

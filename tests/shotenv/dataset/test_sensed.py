@@ -5,7 +5,7 @@ import torch
 
 from shotenv.bank.opening import open_bank
 from shotenv.config.keywords import env_config
-from shotenv.dataset.frames import SensedFrames
+from shotenv.dataset.sensed_frames import SensedFrames
 from unwrap.depth.correction import unwrapped
 from unwrap.depth.merge import nearest_wraps
 from unwrap.signal.frequencies import unambiguous_range_m

@@ -13,7 +13,7 @@ from shotenv.config.env import RewardConfig
 from shotenv.config.keywords import env_config
 from shotenv.decision.drive import draw_frames
 from shotenv.decision.features import FEATURE_NAMES, LIMIT, frame_means
-from shotenv.decision.observe import observe
+from shotenv.decision.observation import observe
 from shotenv.decision.outcomes import outcomes_of_all_actions
 from shotenv.decision.problem import open_problem
 from shotenv.decision.rewards import TERMS, reward, reward_terms

@@ -15,7 +15,7 @@ from shotenv.config.reader import ConfigError, find_config, merged, read_config
 from shotenv.config.sensor import SensorConfig
 from shotenv.laser.ageing import ageing_rate
 from shotenv.laser.energy import efficiency_at, emitted_power_w, shot_cost
-from shotenv.laser.state import LaserState, laser_step, start_laser, too_bright
+from shotenv.laser.laser_state import LaserState, laser_step, start_laser, too_bright
 from shotenv.laser.thermal import case_step, junction_step, trip_step
 
 PERIOD_S = 0.1

@@ -12,7 +12,7 @@ from agents.evaluation.headroom import check_solvable
 from agents.evaluation.play import play_drives
 from agents.evaluation.study import make_envs
 from agents.optimum.dynamic import clairvoyant, greedy
-from agents.optimum.table import play
+from agents.optimum.outcome_table import play
 from agents.optimum.tabulation import tabulate
 from agents.policies.fixed import FixedPolicy, RandomPolicy
 from shotenv.config.keywords import env_config

@@ -7,11 +7,11 @@ from PIL import Image
 
 from shotenv.bank.opening import open_bank
 from shotenv.config.keywords import env_config
-from shotenv.dataset.frames import SensedFrames
+from shotenv.dataset.sensed_frames import SensedFrames
 from unwrap.comparison.methods import SCORED_AT_ONCE, Estimate, Method, classical_methods
 from unwrap.comparison.plan import TableConfig, trainings
-from unwrap.comparison.score import accuracy_and_precision, rows_of
-from unwrap.comparison.table import FIGURE, NUMBERS, PAGE, make_table
+from unwrap.comparison.results_table import FIGURE, NUMBERS, PAGE, make_table
+from unwrap.comparison.scores import accuracy_and_precision, rows_of
 from unwrap.depth.correction import unwrapped
 from unwrap.depth.metrics import MIN_DEPTH_M
 from unwrap.signal.shots import Shots

@@ -17,9 +17,9 @@ from shotenv.sensor.description import describe
 from unwrap.depth.correction import unwrapped
 from unwrap.depth.merge import merge_nearest, merge_segmentation
 from unwrap.export import check as exporting
-from unwrap.export.frames import export_frames
+from unwrap.export.export_frames import export_frames
 from unwrap.export.onnx_files import exported, run as run_content, run_torch, to_onnx
-from unwrap.networks.base import Settings
+from unwrap.networks.network import Settings
 from unwrap.networks.predictor import load_unwrapper
 from unwrap.networks.registry import build
 from unwrap.networks.tofsegnet import TofSegNet

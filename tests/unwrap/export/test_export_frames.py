@@ -6,7 +6,7 @@ import torch
 from shotenv.bank.opening import open_bank
 from shotenv.bank.store import BankError
 from shotenv.config.keywords import env_config
-from unwrap.export.frames import choose_bank, export_frames
+from unwrap.export.export_frames import choose_bank, export_frames
 from unwrap.signal.shots import Shots
 
 HEIGHT, WIDTH = 48, 64

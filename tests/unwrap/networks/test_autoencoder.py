@@ -7,7 +7,7 @@ import torch
 from torch import nn
 
 from unwrap.networks.autoencoder import STRIDE, class_depth_m, convolution, pad
-from unwrap.networks.base import Settings, multiply_accumulates
+from unwrap.networks.network import Settings, multiply_accumulates
 from unwrap.networks.registry import NAMES, build
 from unwrap.networks.tofregnet import TofRegNet
 from unwrap.networks.tofsegnet import TofSegNet

@@ -6,8 +6,8 @@ from torch import nn
 from unwrap_source import SENSOR, Walls
 
 from unwrap.networks import engines as inference
-from unwrap.networks.base import Settings, arithmetic, autocast
 from unwrap.networks.engines import Prepared, folded
+from unwrap.networks.network import Settings, arithmetic, autocast
 from unwrap.networks.openvino import Program
 from unwrap.networks.predictor import load_unwrapper
 from unwrap.networks.registry import NAMES, build

@@ -8,7 +8,7 @@ import pytest
 import torch
 from peer_scenes import SENSOR, SPEED_OF_LIGHT_M_S, UNAMBIGUOUS_M, samples, steps
 
-from unwrap.networks.features import compressed, phase_maps
+from unwrap.networks.phase_maps import compressed, phase_maps
 from unwrap.signal.frames import RawFrame
 from unwrap.signal.sensed import Sensed, wrapped_distance_m
 

@@ -9,8 +9,8 @@ import pytest
 import torch
 from peer_scenes import SENSOR, UNAMBIGUOUS_M, batch, samples, steps, wraps_of
 
-from unwrap.networks.base import Settings, multiply_accumulates
 from unwrap.networks.losses import LossWeights
+from unwrap.networks.network import Settings, multiply_accumulates
 from unwrap.networks.peers.planes import judged, mean_of_known, sample_planes
 from unwrap.networks.peers.su import smoothness
 from unwrap.networks.registry import build

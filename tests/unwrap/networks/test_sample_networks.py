@@ -22,7 +22,7 @@ from shotenv.decision.problem import open_problem
 from shotenv.decision.transition import reset
 from shotenv.env.vector import ShotScheduleVectorEnv
 from unwrap.depth.correction import correct
-from unwrap.networks.base import Settings
+from unwrap.networks.network import Settings
 from unwrap.networks.predictor import load_unwrapper
 from unwrap.networks.registry import build
 from unwrap.networks.weight_files import save_weights

@@ -7,7 +7,7 @@ import pytest
 import torch
 from unwrap_source import HEIGHT, SENSOR, WIDTH, Walls
 
-from unwrap.networks.base import Settings, autocast
+from unwrap.networks.network import Settings, autocast
 from unwrap.networks.predictor import load_unwrapper
 from unwrap.networks.registry import build
 from unwrap.networks.sizes import enlarged, stride_to, thinned, trained_size

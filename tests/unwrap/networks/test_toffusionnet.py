@@ -10,8 +10,8 @@ import torch
 from peer_scenes import SENSOR, UNAMBIGUOUS_M, batch, samples, wraps_of
 
 from unwrap.depth.confidence import expected_calibration_error
-from unwrap.networks.base import Settings, multiply_accumulates
 from unwrap.networks.losses import LossWeights
+from unwrap.networks.network import Settings, multiply_accumulates
 from unwrap.networks.registry import build
 from unwrap.networks.toffusionnet import (
     DOUBTED,

@@ -10,7 +10,7 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 from unwrap_source import HEIGHT, SENSOR, WIDTH, Walls
 
 from unwrap.networks.autoencoder import wrap_classes
-from unwrap.networks.base import Settings
+from unwrap.networks.network import Settings
 from unwrap.networks.predictor import load_unwrapper
 from unwrap.networks.sizes import trained_size
 from unwrap.networks.weight_files import save_weights

@@ -35,7 +35,7 @@ def sample_planes(sensed: Sensed, sensor: SensorDescription) -> Tensor:
     -------
     float32 [B, 7, H, W]
         Four samples over amplitude, in about [-2, 2]; compressed amplitude over noise, see
-        `unwrap.networks.features.compressed`; saturation, 0 or 1; 1 with four samples, 0 with two.
+        `unwrap.networks.phase_maps.compressed`; saturation, 0 or 1; 1 with four samples, 0 with two.
     """
     frame, noise, raw = first_phase(sensed, sensor), noise_of(sensed, sensor), samples_of(sensed)
     samples = raw.dcs_lsb[:, :SAMPLES_PER_FREQUENCY]

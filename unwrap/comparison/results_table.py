@@ -14,7 +14,7 @@ from shotenv.dataset import SensedFrames, sources
 from unwrap.comparison.methods import Method, classical_methods, methods_of
 from unwrap.comparison.page import PUBLISHED, Row, figure, tables
 from unwrap.comparison.plan import TableConfig, Training, trained, trainings
-from unwrap.comparison.score import rows_of
+from unwrap.comparison.scores import rows_of
 from unwrap.networks import Unwrapper
 from unwrap.signal import unambiguous_range_m
 from unwrap.support import progress, say, write_bytes, write_json

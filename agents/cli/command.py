@@ -1,0 +1,76 @@
+"""What every command is, and the arguments that several of them share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from jsonargparse import ArgumentParser, Namespace
+
+from shotenv.config import configs_dir
+from unwrap.support import Section, write_json
+
+DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
+
+
+@dataclass(frozen=True)
+class Command:
+    """One command: its words, what it is for, its arguments and what it does.
+
+    Attributes
+    ----------
+    words, help : str
+    arguments : callable
+        Adds the command's own arguments to a parser.
+    action : callable
+        Does the work with the parsed arguments and returns the exit status.
+    resumes : bool
+        Whether the same command continues where an interrupted one stopped.
+    """
+
+    words: str
+    help: str
+    arguments: Callable[[ArgumentParser], None]
+    action: Callable[[Namespace], int]
+    resumes: bool = False
+
+    def parser(self) -> ArgumentParser:
+        """Parser of the command's own arguments."""
+        parser = ArgumentParser(
+            prog=f"shotenv {self.words}",
+            description=self.help,
+            exit_on_error=False,
+            allow_abbrev=False,
+        )
+        self.arguments(parser)
+        return parser
+
+
+def add_config(parser: ArgumentParser, section: type[Section], default: str) -> None:
+    """`--config FILE` and an override for each field, over the shipped file `default`."""
+    parser.default_config_files = [str(configs_dir() / default)]
+    parser.add_argument("--config", action="config", help="YAML file over the defaults")
+    parser.add_class_arguments(section, None, sub_configs=True)
+
+
+def add_json(parser: ArgumentParser) -> None:
+    """`--json FILE`, see `write_numbers`."""
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers to FILE")
+
+
+def add_out(parser: ArgumentParser, default: str, what: str) -> None:
+    """`--out DIR`."""
+    parser.add_argument("--out", type=Path, default=Path(default), metavar="DIR", help=what)
+
+
+def write_numbers(arguments: Namespace, numbers: Any) -> None:
+    """Write `numbers` to the file that `--json` names, if any."""
+    if arguments.json is not None:
+        write_json(arguments.json, numbers)
+
+
+def section_of(model: type[Section], arguments: Namespace) -> Any:
+    """The section whose fields are among the arguments."""
+    return model(**{name: arguments[name] for name in model.model_fields})
