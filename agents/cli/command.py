@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jsonargparse import ArgumentParser, Namespace
+from pydantic import BaseModel
 
 from shotenv.config import configs_dir
 from unwrap.support import Section, write_json
@@ -71,6 +72,6 @@ def write_numbers(arguments: Namespace, numbers: Any) -> None:
         write_json(arguments.json, numbers)
 
 
-def section_of(model: type[Section], arguments: Namespace) -> Any:
+def section_of(model: type[BaseModel], arguments: Namespace) -> Any:
     """The section whose fields are among the arguments."""
     return model(**{name: arguments[name] for name in model.model_fields})

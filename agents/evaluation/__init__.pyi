@@ -7,7 +7,5 @@ from .headroom import (
 from .play import Played as Played, drive_seeds as drive_seeds, play_drives as play_drives
 from .study import (
     evaluate_scheduler as evaluate_scheduler,
-    make_ready as make_ready,
-    run_demo as run_demo,
     train_scheduler as train_scheduler,
 )

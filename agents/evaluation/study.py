@@ -29,7 +29,7 @@ from agents.report import (
     write_strip,
 )
 from shotenv.config import EnvConfig
-from unwrap.support import progress, say, write_json
+from unwrap.support import progress, write_json
 
 if TYPE_CHECKING:
     from stable_baselines3.common.policies import ActorCriticPolicy
@@ -48,20 +48,6 @@ def make_envs(config: EnvConfig, split: str, count: int, mode: str) -> ShotSched
 
     fields = config.model_copy(update={"split": split}).model_dump()
     return ShotScheduleVectorEnv(count, autoreset_mode=mode, remember=True, **fields)
-
-
-def make_ready(config: EnvConfig) -> None:
-    """Render the bank and compute the network's predictions where they do not stand yet.
-
-    From then on one thread serves: maps of some ten thousand pixels gain nothing from more, which
-    would only wait for each other.
-    """
-    import torch
-
-    from shotenv.decision import open_problem
-
-    open_problem(config.model_copy(update={"split": "all"}))
-    torch.set_num_threads(1)
 
 
 def train_scheduler(config: DemoConfig, out: Path) -> PpoPolicy:
@@ -196,15 +182,3 @@ def _drive_to_show(played: Played) -> int:
     families = [len(set(row)) for row in played.family.tolist()]
     hottest = played.temperature_k.max(axis=1).tolist()
     return max(range(len(families)), key=lambda i: (families[i], hottest[i]))
-
-
-def run_demo(config: DemoConfig, out: Path) -> dict[str, Any]:
-    """Render, tune, train, evaluate; returns the results that were written to `out`."""
-    say(f"1/4  Bank '{config.env.bank}' and the network's predictions for it")
-    make_ready(config.env)
-    say(f"2/4  PPO scheduler, {config.agent.total_steps} steps")
-    scheduler = train_scheduler(config, out / "agent")
-    say("3/4  Baselines and test drives")
-    results = evaluate_scheduler(config, scheduler, out)
-    say("4/4  Report")
-    return results

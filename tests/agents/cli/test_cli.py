@@ -33,7 +33,7 @@ def test_overview_lists_every_command(capsys):
 def test_every_command_explains_itself(capsys, command):
     status, out, _ = run(capsys, *command.words.split(), "--help")
     assert status == 0 and f"shotenv {command.words}" in out
-    assert callable(command.function)
+    assert callable(command.action)
 
 
 def test_a_group_lists_its_commands(capsys):

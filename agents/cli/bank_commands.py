@@ -1,0 +1,118 @@
+"""Commands that render banks, tell what is in them and check them."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+from jsonargparse import ArgumentParser, Namespace
+from jsonargparse.typing import PositiveInt
+
+from agents.cli.command import (
+    DONE,
+    FAILED,
+    Command,
+    add_config,
+    add_json,
+    section_of,
+    write_numbers,
+)
+from shotenv.config import BankConfig
+from unwrap.support import progress, say, write_bytes
+
+
+def render_arguments(parser: ArgumentParser) -> None:
+    """What is rendered, where to, and by how many processes."""
+    add_config(parser, BankConfig, "bank/starter.yaml")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the bank")
+    parser.add_argument("--workers", type=PositiveInt, metavar="N", help="processes; one per core")
+
+
+def render_bank(arguments: Namespace) -> int:
+    """Render a bank."""
+    from shotenv.bank import build_bank
+
+    config = section_of(BankConfig, arguments)
+    folder = build_bank(config, arguments.out, workers=arguments.workers)
+    print(f"The bank is in {folder}")
+    return DONE
+
+
+def info_arguments(parser: ArgumentParser) -> None:
+    """Which bank, and the contact sheet that is wanted of it."""
+    parser.add_argument("bank", nargs="?", help="name or path of a bank; all that are known")
+    parser.add_argument("--sheet", type=Path, metavar="FILE", help="write a contact sheet (PNG)")
+    parser.add_argument("--clips", type=PositiveInt, default=3, help="on the sheet, per family")
+    add_json(parser)
+
+
+def tell_about_banks(arguments: Namespace) -> int:
+    """Tell what is in a bank, or which banks there are."""
+    from shotenv.bank import (
+        contact_sheet,
+        describe_bank,
+        known_banks,
+        open_bank,
+        print_bank,
+        print_banks,
+    )
+
+    if arguments.bank is None:
+        banks = known_banks()
+        print_banks(banks)
+        write_numbers(arguments, banks)
+        return DONE
+    bank = open_bank(arguments.bank, render=False)
+    about = describe_bank(bank)
+    print_bank(about)
+    if arguments.sheet is not None:
+        content = io.BytesIO()
+        contact_sheet(bank, clips=arguments.clips).save(content, format="PNG")
+        write_bytes(arguments.sheet, content.getvalue())
+        print(f"Contact sheet: {arguments.sheet.resolve()}")
+    write_numbers(arguments, about)
+    return DONE
+
+
+def verify_arguments(parser: ArgumentParser) -> None:
+    """Which bank."""
+    parser.add_argument("bank", help="name or path of a bank")
+    add_json(parser)
+
+
+def verify_bank(arguments: Namespace) -> int:
+    """Check every file of a bank against its checksum."""
+    from shotenv.bank import open_bank, verify
+
+    bank = open_bank(arguments.bank, render=False)
+    with progress(len(bank.clips), "verifying", "clip") as bar:
+        damaged = verify(bank.folder, tick=bar.update)
+    for path in (bank.folder / name for name in damaged):
+        say(f"shotenv: {path} is damaged; delete {path.parent} and render the bank again")
+    if not damaged:
+        print(f"{bank.folder}: every file is as it was written")
+    write_numbers(arguments, {"folder": str(bank.folder), "damaged": list(damaged)})
+    return FAILED if damaged else DONE
+
+
+COMMANDS = (
+    Command(
+        "render",
+        "render a bank of worlds; continues where it stopped",
+        render_arguments,
+        render_bank,
+        resumes=True,
+    ),
+    Command(
+        "bank info",
+        "list the banks, or tell and show what is in one",
+        info_arguments,
+        tell_about_banks,
+    ),
+    Command(
+        "bank verify",
+        "check every file of a bank against its checksum",
+        verify_arguments,
+        verify_bank,
+    ),
+)

@@ -1,0 +1,123 @@
+"""Commands that train schedulers, judge them and report: `demo` is all of them in one go."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from jsonargparse import ArgumentParser, Namespace
+
+from agents.cli.command import DONE, Command, add_out, write_numbers
+from agents.cli.experiment import (
+    add_experiment,
+    experiment_of,
+    play_on_one_thread,
+    prepare_bank,
+)
+from unwrap.support import say
+
+
+def demo_arguments(parser: ArgumentParser) -> None:
+    """The experiment, and where its results go."""
+    add_experiment(parser)
+    add_out(parser, "runs/demo", "folder of the results and the report")
+
+
+def run_demo(arguments: Namespace) -> int:
+    """Render, train, evaluate and report: the main job, small."""
+    from agents.evaluation import evaluate_scheduler, train_scheduler
+
+    config = experiment_of(arguments)
+    say(f"1/4  Bank '{config.env.bank}' and the network's predictions for it")
+    prepare_bank(config.env)
+    play_on_one_thread()
+    say(f"2/4  PPO scheduler, {config.agent.total_steps} steps")
+    scheduler = train_scheduler(config, arguments.out / "agent")
+    say("3/4  Baselines and test drives")
+    results = evaluate_scheduler(config, scheduler, arguments.out)
+    say("4/4  Report")
+    return publish(arguments, results)
+
+
+def train_arguments(parser: ArgumentParser) -> None:
+    """The experiment, and where the scheduler goes."""
+    add_experiment(parser)
+    add_out(parser, "runs/agent", "folder of the scheduler and its checkpoint")
+
+
+def train(arguments: Namespace) -> int:
+    """Train a scheduler."""
+    from agents.evaluation import train_scheduler
+
+    config = experiment_of(arguments)
+    prepare_bank(config.env)
+    play_on_one_thread()
+    train_scheduler(config, arguments.out)
+    print(f"The scheduler is in {arguments.out}; `shotenv evaluate {arguments.out}` judges it.")
+    return DONE
+
+
+def evaluate_arguments(parser: ArgumentParser) -> None:
+    """Which scheduler, the experiment, and where its results go."""
+    parser.add_argument("scheduler", type=Path, help="folder of a trained scheduler")
+    add_experiment(parser)
+    add_out(parser, "runs/evaluation", "folder of the results and the report")
+
+
+def evaluate(arguments: Namespace) -> int:
+    """Judge a trained scheduler."""
+    from agents.evaluation import evaluate_scheduler
+    from agents.policies import PpoPolicy
+
+    scheduler, config = PpoPolicy.load(arguments.scheduler), experiment_of(arguments)
+    prepare_bank(config.env)
+    play_on_one_thread()
+    return publish(arguments, evaluate_scheduler(config, scheduler, arguments.out))
+
+
+def publish(arguments: Namespace, results: dict[str, Any]) -> int:
+    """Write the page of the results in `--out`, and say what they say."""
+    from agents.report import rival_note, verdict, write_report
+
+    page = write_report(arguments.out)
+    write_numbers(arguments, results)
+    print(f"\n{verdict(results)} {rival_note(results)}\n\nReport: {page.resolve()}")
+    return DONE
+
+
+def report_arguments(parser: ArgumentParser) -> None:
+    """Which results."""
+    parser.add_argument("results", type=Path, help="folder that an evaluation wrote")
+
+
+def report(arguments: Namespace) -> int:
+    """Write the page of an evaluation anew."""
+    from agents.report import write_report
+
+    print(write_report(arguments.results))
+    return DONE
+
+
+COMMANDS = (
+    Command(
+        "demo",
+        "render, train a scheduler, compare it with baselines, write a report",
+        demo_arguments,
+        run_demo,
+        resumes=True,
+    ),
+    Command(
+        "train",
+        "train a scheduler with PPO; continues where it stopped",
+        train_arguments,
+        train,
+        resumes=True,
+    ),
+    Command(
+        "evaluate",
+        "compare a trained scheduler with baselines, write a report",
+        evaluate_arguments,
+        evaluate,
+    ),
+    Command("report", "write the report of an evaluation anew", report_arguments, report),
+)
