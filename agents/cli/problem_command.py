@@ -35,7 +35,7 @@ def measure_configuration(arguments: Namespace) -> int:
             for split, count in counts.items()
         )
     found = measure_problem(validation, test, config.env.reward, config.study)
-    print_problem(found, config.study.confidence)
+    print_problem(found, config)
     write_numbers(arguments, found)
     return DONE
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from jsonargparse import ArgumentParser, Namespace
 
@@ -14,7 +14,11 @@ from agents.cli.experiment import (
     play_on_one_thread,
     prepare_bank,
 )
+from agents.config import DemoConfig
 from unwrap.support import say
+
+if TYPE_CHECKING:
+    from agents.evaluation import Evaluation
 
 
 def demo_arguments(parser: ArgumentParser) -> None:
@@ -25,7 +29,8 @@ def demo_arguments(parser: ArgumentParser) -> None:
 
 def run_demo(arguments: Namespace) -> int:
     """Render, train, evaluate and report: the main job, small."""
-    from agents.evaluation import evaluate_scheduler, train_scheduler
+    from agents.evaluation import evaluate_scheduler
+    from agents.training import train_scheduler
 
     config = experiment_of(arguments)
     say(f"1/4  Bank '{config.env.bank}' and the network's predictions for it")
@@ -34,9 +39,9 @@ def run_demo(arguments: Namespace) -> int:
     say(f"2/4  PPO scheduler, {config.agent.total_steps} steps")
     scheduler = train_scheduler(config, arguments.out / "agent")
     say("3/4  Baselines and test drives")
-    results = evaluate_scheduler(config, scheduler, arguments.out)
+    evaluation = evaluate_scheduler(config, scheduler)
     say("4/4  Report")
-    return publish(arguments, results)
+    return publish(arguments, config, evaluation)
 
 
 def train_arguments(parser: ArgumentParser) -> None:
@@ -47,7 +52,7 @@ def train_arguments(parser: ArgumentParser) -> None:
 
 def train(arguments: Namespace) -> int:
     """Train a scheduler."""
-    from agents.evaluation import train_scheduler
+    from agents.training import train_scheduler
 
     config = experiment_of(arguments)
     prepare_bank(config.env)
@@ -72,13 +77,15 @@ def evaluate(arguments: Namespace) -> int:
     scheduler, config = PpoPolicy.load(arguments.scheduler), experiment_of(arguments)
     prepare_bank(config.env)
     play_on_one_thread()
-    return publish(arguments, evaluate_scheduler(config, scheduler, arguments.out))
+    return publish(arguments, config, evaluate_scheduler(config, scheduler))
 
 
-def publish(arguments: Namespace, results: dict[str, Any]) -> int:
-    """Write the page of the results in `--out`, and say what they say."""
-    from agents.report import rival_note, verdict, write_report
+def publish(arguments: Namespace, config: DemoConfig, evaluation: Evaluation) -> int:
+    """Write the results and their page into `--out`, and say what they say."""
+    from agents.report import rival_note, verdict, write_evaluation, write_report
 
+    results = evaluation.results
+    write_evaluation(evaluation, config, arguments.out)
     page = write_report(arguments.out)
     write_numbers(arguments, results)
     print(f"\n{verdict(results)} {rival_note(results)}\n\nReport: {page.resolve()}")

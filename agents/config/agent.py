@@ -1,8 +1,6 @@
-"""TODO."""
+"""How a scheduler is trained."""
 
 from __future__ import annotations
-
-from typing import Literal
 
 from pydantic import Field
 
@@ -12,7 +10,6 @@ from unwrap.support import Fraction, NonNegative, Positive, Section
 class AgentConfig(Section):
     """Training of a scheduler with PPO."""
 
-    algorithm: Literal["ppo"] = Field("ppo", description="stable-baselines3 algorithm")
     total_steps: int = Field(100_000, ge=1, description="environment steps in all")
     num_envs: int = Field(16, ge=1, description="environments in the batch")
     drives: int = Field(32, ge=1, description="different drives to train on, again and again")

@@ -1,4 +1,4 @@
-"""TODO."""
+"""The whole experiment: environment, scheduler and judgement."""
 
 from __future__ import annotations
 
@@ -9,7 +9,17 @@ from unwrap.support import Section
 
 
 class DemoConfig(Section):
-    """The main job, small."""
+    """What `shotenv demo` and its parts are told.
+
+    Attributes
+    ----------
+    env : EnvConfig
+        Bank, sensor, laser and reward.
+    agent : AgentConfig
+        Training of the scheduler.
+    study : StudyConfig
+        Drives that it is judged on.
+    """
 
     env: EnvConfig
     agent: AgentConfig

@@ -1,4 +1,4 @@
-"""TODO."""
+"""How policies are judged."""
 
 from __future__ import annotations
 

@@ -1,11 +1,13 @@
 from .headroom import (
-    SHOTS as SHOTS,
     check_solvable as check_solvable,
     measure_problem as measure_problem,
     print_problem as print_problem,
 )
-from .play import Played as Played, drive_seeds as drive_seeds, play_drives as play_drives
-from .study import (
-    evaluate_scheduler as evaluate_scheduler,
-    train_scheduler as train_scheduler,
+from .play import (
+    PlayedDrives as PlayedDrives,
+    drive_seeds as drive_seeds,
+    make_envs as make_envs,
+    play_drives as play_drives,
 )
+from .study import Evaluation as Evaluation, evaluate_scheduler as evaluate_scheduler
+from .summary import drive_rows as drive_rows, timeline as timeline

@@ -10,32 +10,33 @@ from typing import Any, Final
 
 import numpy as np
 
-from agents.config import StudyConfig
+from agents.config import DemoConfig, StudyConfig
 from agents.evaluation.statistics import excess, interval, mean
 from agents.optimum import (
     DriveTable,
-    Played,
+    PlayedTable,
     Possible,
+    always,
     best_choice,
+    best_rule,
     blind_choices,
     clairvoyant,
-    describe_rule,
-    fixed,
     greedy,
     play,
     threshold,
-    tuned_rule,
 )
 from shotenv.config import LaserConfig, RewardConfig
+from unwrap.signal import Shots
 
-SHOTS: Final = (2, 4, 8)
 GOALS: Final = {
     "best_fixed": 0.15,
     "best_blind": 0.12,
     "threshold_rule": 0.05,
     "greedy": 0.05,
 }
+"""Least excess over the optimum of each kind of policy, for the problem to be worth solving."""
 LEAST_SHARE: Final = 0.10
+"""Of the optimum's frames, for each action."""
 SWEEP: Final = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8)
 
 
@@ -90,7 +91,13 @@ def measure_problem(
         }
         for name, (choice, played) in rivals.items()
     }
-    shares = _shares(best, study)
+    working = np.maximum((best.actions >= 0).sum(axis=1), 1)  # frames with laser, of each drive
+    shares = {
+        str(shots): _interval(
+            mean, study, (best.actions == shots.action).sum(axis=1) / working, name="mean"
+        )
+        for shots in Shots
+    }
     return {
         "drives": len(best.cost),
         "optimum": {
@@ -105,32 +112,21 @@ def measure_problem(
     }
 
 
-def _rivals(validation: DriveTable, table: DriveTable) -> dict[str, tuple[str, Played]]:
+def _rivals(validation: DriveTable, table: DriveTable) -> dict[str, tuple[str, PlayedTable]]:
     """Each kind of policy at its best: what it chooses, and how it plays."""
     blind = dict(blind_choices())
-    always = {f"always {shots}": fixed(action) for action, shots in enumerate(SHOTS)}
-    best_fixed, best_blind = best_choice(table, always.items()), best_choice(table, blind.items())
-    rule = tuned_rule(validation)
+    fixed = {f"always {shots}": always(shots.action) for shots in Shots}
+    best_fixed, best_blind = best_choice(table, fixed.items()), best_choice(table, blind.items())
+    rule = best_rule(validation)
     short_sighted = {
         "least cost of the frame": greedy(table, guarded=False),
         "least cost of the frame that does not trip": greedy(table, guarded=True),
     }
     return {
-        "best_fixed": (best_fixed, play(table, always[best_fixed])),
+        "best_fixed": (best_fixed, play(table, fixed[best_fixed])),
         "best_blind": (best_blind, play(table, blind[best_blind])),
-        "threshold_rule": (describe_rule(rule), play(table, threshold(*rule))),
+        "threshold_rule": (str(rule), play(table, threshold(*rule))),
         "greedy": min(short_sighted.items(), key=lambda item: item[1].cost.sum()),
-    }
-
-
-def _shares(best: Played, study: StudyConfig) -> dict[str, dict[str, float]]:
-    """Share of each action among the frames with laser, with its interval over drives."""
-    working = np.maximum((best.actions >= 0).sum(axis=1), 1)
-    return {
-        str(shots): _interval(
-            mean, study, (best.actions == action).sum(axis=1) / working, name="mean"
-        )
-        for action, shots in enumerate(SHOTS)
     }
 
 
@@ -146,20 +142,24 @@ def _at_weight(test: Possible, weights: RewardConfig, power: float) -> dict[str,
     """What another weight of power makes of the problem."""
     table = test.table(weights.model_copy(update={"power": power}))
     best = clairvoyant(table)
-    costs = [play(table, fixed(action)).cost.sum() for action in range(3)]
-    cheapest = int(np.argmin(costs))
+    costs = {shots: play(table, always(shots.action)).cost.sum() for shots in Shots}
+    cheapest = min(Shots, key=costs.__getitem__)
     return {
         "power": power,
         "shots_share": best.shares.tolist(),
-        "best_fixed": f"always {SHOTS[cheapest]}",
+        "best_fixed": f"always {cheapest}",
         "best_fixed_excess": float(costs[cheapest] / best.cost.sum() - 1.0),
     }
 
 
-def print_problem(found: dict[str, Any], confidence: float) -> None:
-    """The numbers as text."""
-    optimum = found["optimum"]
-    print(f"Clairvoyant optimum over {found['drives']} test drives ({confidence:.0%} intervals)")
+def print_problem(found: dict[str, Any], config: DemoConfig) -> None:
+    """The numbers that `measure_problem` found for `config`, as text."""
+    optimum, env = found["optimum"], config.env
+    measured = f"bank {env.bank}, unwrapper {env.unwrapper}, laser {env.laser.name}"
+    weights = ", ".join(f"{name} {value:g}" for name, value in env.reward.model_dump().items())
+    drives = f"{found['drives']} {config.study.split} drives"
+    print(f"{measured}; reward: {weights}")
+    print(f"Clairvoyant optimum over {drives} ({config.study.confidence:.0%} intervals)")
     for shots, share in optimum["shots_share"].items():
         print(
             f"  {shots} DCS in {share['mean']:6.1%} of frames  "
@@ -181,4 +181,5 @@ def print_problem(found: dict[str, Any], confidence: float) -> None:
         print(
             f"  {row['power']:<16g}{shares:37}{row['best_fixed']}, {row['best_fixed_excess']:.1%}"
         )
-    print(f"\nThe defaults {'hold' if found['holds'] else 'DO NOT hold'} every goal.")
+    held = "holds" if found["holds"] else "DOES NOT hold"
+    print(f"\nThis problem ({measured}) {held} every goal.")

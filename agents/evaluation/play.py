@@ -1,33 +1,25 @@
-"""Evaluation: every policy on the same drives with the same sensor noise, compared in pairs."""
+"""Drives played by policies: the same drives with the same sensor noise for each."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from gymnasium.vector import VectorEnv
 
 from agents.config import StudyConfig
 from agents.policies import FixedPolicy, Policy
+from shotenv.config import EnvConfig
+from shotenv.env import ShotScheduleVectorEnv
+from unwrap.signal import Shots
 
-if TYPE_CHECKING:
-    from gymnasium.vector import VectorEnv
-
-SHOTS: Final = (2, 4, 8)
-FIXED: Final = {f"always_{shots}": FixedPolicy(shots) for shots in SHOTS}
-MEASURES: Final = (
-    "return",
-    "laser_energy_j",
-    "energy_j",
-    "depth_mae_m",
-    "wrap_accuracy",
-    "tripped_share",
-)
+FIXED_POLICIES: Final = {f"always_{shots}": FixedPolicy(shots) for shots in Shots}
 
 
 @dataclass(frozen=True)
-class Played:
+class PlayedDrives:
     """Drives as a policy drove them; N drives of T frames.
 
     Attributes
@@ -54,7 +46,7 @@ class Played:
 
     @property
     def per_drive(self) -> dict[str, np.ndarray]:
-        """One number [N] per drive for each of `MEASURES`."""
+        """Each measure as one number [N] per drive."""
         return {
             "return": self.reward.sum(axis=1),
             "laser_energy_j": self.laser_energy_j.sum(axis=1),
@@ -68,7 +60,13 @@ class Played:
         """Share of 2, 4 and 8 shots among the frames with laser, of one family or of all."""
         counted = self.shots if family is None else self.shots[self.family == family]
         total = max(int(np.count_nonzero(counted)), 1)
-        return [float(np.count_nonzero(counted == shots) / total) for shots in SHOTS]
+        return [float(np.count_nonzero(counted == shots) / total) for shots in Shots]
+
+
+def make_envs(config: EnvConfig, split: str, count: int, mode: str) -> ShotScheduleVectorEnv:
+    """`count` environments of `config` on the drives of `split`, with autoreset mode `mode`."""
+    fields = config.model_copy(update={"split": split}).model_dump()
+    return ShotScheduleVectorEnv(count, autoreset_mode=mode, remember=True, **fields)
 
 
 def drive_seeds(study: StudyConfig, drives: int) -> list[int]:
@@ -82,7 +80,7 @@ def play_drives(
     seeds: Sequence[int],
     *,
     tick: Callable[[int], object] = lambda frames: None,
-) -> Played:
+) -> PlayedDrives:
     """Drive one drive per environment, all at once, to the end.
 
     Parameters
@@ -105,22 +103,21 @@ def play_drives(
         actions = policy.act(observations, infos)
         observations, rewards, terminated, truncated, infos = envs.step(actions)
         done = terminated | truncated
-        frames.append(_frame(rewards, infos))
+        # Where a drive has ended and the next begun in one step, `infos` tell of the new drive.
+        told = infos.get("final_info", infos)
+        off = np.asarray(told["shots"]) == 0
+        frames.append(
+            {
+                "shots": np.array(told["shots"], dtype=np.int64),
+                "reward": np.array(rewards, dtype=np.float64),
+                "laser_energy_j": np.array(told["laser_energy_j"]),
+                "energy_j": np.array(told["energy_j"]),
+                "depth_mae_m": np.where(off, np.nan, told["depth_mae_m"]),
+                "wrap_accuracy": np.where(off, np.nan, told["wrap_accuracy"]),
+                "temperature_k": np.array(told["temperature_k"]),
+                "family": np.array(told["family"], dtype=np.str_),
+            }
+        )
         tick(len(seeds))
     stacked = {name: np.stack([frame[name] for frame in frames], axis=1) for name in frames[0]}
-    return Played(seeds=np.asarray(seeds), **stacked)
-
-
-def _frame(rewards: np.ndarray, infos: Mapping[str, Any]) -> dict[str, Any]:
-    told = infos.get("final_info", infos)
-    off = np.asarray(told["shots"]) == 0
-    return {
-        "shots": np.array(told["shots"], dtype=np.int64),
-        "reward": np.array(rewards, dtype=np.float64),
-        "laser_energy_j": np.array(told["laser_energy_j"]),
-        "energy_j": np.array(told["energy_j"]),
-        "depth_mae_m": np.where(off, np.nan, told["depth_mae_m"]),
-        "wrap_accuracy": np.where(off, np.nan, told["wrap_accuracy"]),
-        "temperature_k": np.array(told["temperature_k"]),
-        "family": np.array(told["family"], dtype=np.str_),
-    }
+    return PlayedDrives(seeds=np.asarray(seeds), **stacked)

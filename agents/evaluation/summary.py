@@ -1,19 +1,16 @@
-"""TODO."""
+"""What was played, as the tables that a report is made of."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from agents.config import StudyConfig
+from agents.evaluation.play import FIXED_POLICIES, PlayedDrives
 from agents.evaluation.statistics import Interval, interval, mean, mean_difference
-
-if TYPE_CHECKING:
-    pass
-from agents.evaluation.play import FIXED, Played
 
 PACKAGES: Final = (
     "shotenv",
@@ -24,39 +21,47 @@ PACKAGES: Final = (
     "numpy",
     "scipy",
 )
+"""Packages whose versions the numbers depend on."""
 
 
-def best_fixed(played: Mapping[str, Played]) -> str:
+def best_fixed(played: Mapping[str, PlayedDrives]) -> str:
     """Name of the fixed choice with the highest mean return on these drives."""
-    return max(FIXED, key=lambda name: played[name].reward.sum())
+    return max(FIXED_POLICIES, key=lambda name: played[name].reward.sum())
 
 
-def best_rival(played: Mapping[str, Played], scheduler: str) -> str:
+def best_rival(played: Mapping[str, PlayedDrives], scheduler: str) -> str:
     """Name of the policy with the highest mean return on these drives, but for the scheduler."""
     others = [name for name in played if name != scheduler]
     return max(others, key=lambda name: played[name].reward.sum())
 
 
 def summary(
-    played: Mapping[str, Played], study: StudyConfig, *, scheduler: str, **extra: Any
+    played: Mapping[str, PlayedDrives], study: StudyConfig, *, scheduler: str
 ) -> dict[str, Any]:
-    """The content of `results.json`.
+    """Means, differences in pairs and their intervals: the content of `results.json`.
 
     Parameters
     ----------
-    played : mapping of str to Played
+    played : mapping of str to PlayedDrives
         The same drives under each policy, the fixed ones among them.
     study : StudyConfig
         Bootstrap draws and confidence.
     scheduler : str
         Name of the policy that was trained.
-    extra
-        Further keys.
     """
     fixed, rival = best_fixed(played), best_rival(played, scheduler)
     families = sorted(set(played[fixed].family.ravel().tolist()))
     return {
-        "policies": {name: _measured(one, study) for name, one in played.items()},
+        "policies": {
+            name: {
+                **{
+                    measure: _interval(mean, study, values).named("mean")
+                    for measure, values in one.per_drive.items()
+                },
+                "shots_share": one.shots_share(),
+            }
+            for name, one in played.items()
+        },
         "paired_to_best_fixed": {
             name: difference(one, played[fixed], study).named("difference")
             for name, one in played.items()
@@ -66,7 +71,7 @@ def summary(
         ),
         "drives": len(played[fixed].seeds),
         "seeds": played[fixed].seeds.tolist(),
-        "versions": versions(),
+        "versions": {name: version(name) for name in PACKAGES},
         "scheduler": scheduler,
         "best_fixed": fixed,
         "best_rival": rival,
@@ -75,19 +80,10 @@ def summary(
             name: {family: one.shots_share(family) for family in families}
             for name, one in played.items()
         },
-        **extra,
     }
 
 
-def _measured(played: Played, study: StudyConfig) -> dict[str, Any]:
-    intervals = {
-        name: _interval(mean, study, values).named("mean")
-        for name, values in played.per_drive.items()
-    }
-    return {**intervals, "shots_share": played.shots_share()}
-
-
-def difference(one: Played, other: Played, study: StudyConfig) -> Interval:
+def difference(one: PlayedDrives, other: PlayedDrives, study: StudyConfig) -> Interval:
     """Mean difference of the returns, drive by drive, one minus other."""
     return _interval(mean_difference, study, one.per_drive["return"], other.per_drive["return"])
 
@@ -96,12 +92,7 @@ def _interval(statistic: Callable, study: StudyConfig, *samples: np.ndarray) -> 
     return interval(statistic, *samples, draws=study.bootstrap_draws, confidence=study.confidence)
 
 
-def versions() -> dict[str, str]:
-    """Versions of the packages that the numbers depend on."""
-    return {name: version(name) for name in PACKAGES}
-
-
-def drive_rows(played: Mapping[str, Played]) -> list[dict[str, Any]]:
+def drive_rows(played: Mapping[str, PlayedDrives]) -> list[dict[str, Any]]:
     """One row per policy and drive: the content of `drives.csv`."""
     return [
         {
@@ -115,9 +106,23 @@ def drive_rows(played: Mapping[str, Played]) -> list[dict[str, Any]]:
 
 
 def timeline(
-    played: Mapping[str, Played], drive: int, frame_rate_hz: float, trip_k: float, release_k: float
+    played: Mapping[str, PlayedDrives],
+    drive: int,
+    frame_rate_hz: float,
+    trip_k: float,
+    release_k: float,
 ) -> dict[str, Any]:
-    """One drive, frame by frame, under each policy: the content of `timeline.json`."""
+    """One drive, frame by frame, under each policy: the content of `timeline.json`.
+
+    Parameters
+    ----------
+    played : mapping of str to PlayedDrives
+        The same drives under each policy.
+    drive : int
+        Row of the drive.
+    frame_rate_hz, trip_k, release_k : float
+        Of the drives, and temperatures at which their laser trips and comes back.
+    """
     first = next(iter(played.values()))
     return {
         "drive": int(first.seeds[drive]),

@@ -4,23 +4,36 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from agents.optimum.outcome_table import (
-    Choice,
-    DriveTable,
-    Name,
-    Rule,
-    Situation,
-    play,
-)
+from agents.optimum.outcome_table import Choice, DriveTable, Situation, play
+from agents.policies import rule_in_words
 from unwrap.signal import Shots
 
-SHOTS = tuple(map(int, Shots))
+Name = TypeVar("Name")
 
 
-def fixed(action: int) -> Choice:
+class Rule(NamedTuple):
+    """Parameters of a one-threshold rule: actions below and above `limit`."""
+
+    limit: float
+    below: int
+    above: int
+
+    @property
+    def shots(self) -> tuple[Shots, Shots]:
+        """Samples taken below and above the limit."""
+        of_action = tuple(Shots)
+        return of_action[self.below], of_action[self.above]
+
+    def __str__(self) -> str:
+        """The rule in words."""
+        return rule_in_words(self.limit, *self.shots)
+
+
+def always(action: int) -> Choice:
     """Choose `action` in every frame."""
     return lambda now: np.full(now.snr.shape, action)
 
@@ -62,25 +75,19 @@ def best_choice(table: DriveTable, choices: Iterable[tuple[Name, Choice]]) -> Na
 
 def blind_choices(longest: int = 8, steps: int = 5) -> Iterator[tuple[str, Choice]]:
     """Choices that look at nothing: fixed, one frame in n different, and mixtures on a grid."""
-    for action in range(3):
-        yield f"always {SHOTS[action]}", fixed(action)
+    for shots in Shots:
+        yield f"always {shots}", always(shots.action)
     for length, (one, rest) in itertools.product(
-        range(2, longest + 1), itertools.permutations(range(3), 2)
+        range(2, longest + 1), itertools.permutations(Shots, 2)
     ):
-        name = f"{SHOTS[one]} every {length} frames, else {SHOTS[rest]}"
-        yield name, cycle((one, *[rest] * (length - 1)))
+        pattern = one.action, *[rest.action] * (length - 1)
+        yield f"{one} every {length} frames, else {rest}", cycle(pattern)
     for two, four in itertools.product(range(1, steps), repeat=2):
         if two + four < steps:
             shares = (two / steps, four / steps, 1 - (two + four) / steps)
             yield "mixture {:.0%}/{:.0%}/{:.0%} of 2/4/8".format(*shares), mixture(shares)
 
 
-def tuned_rule(validation: DriveTable) -> Rule:
+def best_rule(validation: DriveTable) -> Rule:
     """The one-threshold rule that costs least on validation drives."""
     return best_choice(validation, threshold_choices(validation))
-
-
-def describe_rule(rule: Rule) -> str:
-    """A one-threshold rule in words."""
-    below, above = SHOTS[rule.below], SHOTS[rule.above]
-    return f"{below} DCS where signal_to_noise < {rule.limit:.3f}, else {above}"

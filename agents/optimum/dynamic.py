@@ -17,14 +17,14 @@ import numpy as np
 
 from agents.optimum.outcome_table import (
     DriveTable,
-    Laser,
-    Played,
+    PlayedTable,
     Situation,
+    ThermalState,
     play,
 )
 
 
-def clairvoyant(table: DriveTable, *, levels: int = 801, rise_levels: int = 25) -> Played:
+def clairvoyant(table: DriveTable, *, levels: int = 801, rise_levels: int = 25) -> PlayedTable:
     """Optimum over all choices, by dynamic programming on a grid of temperatures.
 
     `levels` temperatures of the case; with a junction stage a quarter of them, times `rise_levels`
@@ -41,7 +41,7 @@ def clairvoyant(table: DriveTable, *, levels: int = 801, rise_levels: int = 25) 
     return play(table, choose)
 
 
-def greedy(table: DriveTable, *, guarded: bool) -> Played:
+def greedy(table: DriveTable, *, guarded: bool) -> PlayedTable:
     """Least cost of this frame alone; `guarded` avoids actions that trip the laser at once."""
 
     def choose(now: Situation) -> np.ndarray:
@@ -58,11 +58,11 @@ class _Grid(NamedTuple):
     case_k: np.ndarray
     rise_k: np.ndarray
 
-    def everywhere(self, drives: int, *, tripped: bool) -> Laser:
+    def everywhere(self, drives: int, *, tripped: bool) -> ThermalState:
         """A laser at every point of the grid, [N, K]."""
         case_k, rise_k = np.meshgrid(self.case_k, self.rise_k, indexing="ij")
         shape = drives, case_k.size
-        return Laser(
+        return ThermalState(
             np.broadcast_to(case_k.ravel(), shape),
             np.broadcast_to(rise_k.ravel(), shape),
             np.full(shape, tripped),
@@ -102,7 +102,7 @@ class _Corners(NamedTuple):
     weight: np.ndarray
 
 
-def _corners(grid: _Grid, laser: Laser) -> _Corners:
+def _corners(grid: _Grid, laser: ThermalState) -> _Corners:
     """The grid points that a value is interpolated from."""
     case_k, rise_k, tripped = np.broadcast_arrays(*laser)
     drive = np.arange(len(case_k)).reshape(-1, *[1] * (case_k.ndim - 1))

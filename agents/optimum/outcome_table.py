@@ -7,18 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
 Choice = Callable[["Situation"], np.ndarray]
+"""From what is known before a frame to the action of each drive, int64 [N]."""
 
 
-Name = TypeVar("Name")
-
-
-class Laser(NamedTuple):
-    """State of each drive's laser, [N, ...] for several states of each.
+class ThermalState(NamedTuple):
+    """Of each drive's laser, [N, ...] for several states of each.
 
     `case_k` is the temperature of the case, `rise_k` what the junction is above it.
     """
@@ -33,15 +31,7 @@ class Laser(NamedTuple):
         return self.case_k + self.rise_k
 
 
-Advance = Callable[[Laser, np.ndarray], Laser]
-
-
-class Rule(NamedTuple):
-    """Parameters of a one-threshold rule: actions below and above `limit`."""
-
-    limit: float
-    below: int
-    above: int
+Advance = Callable[[ThermalState, np.ndarray], ThermalState]
 
 
 @dataclass(frozen=True)
@@ -62,7 +52,7 @@ class DriveTable:
     heat_j : float64 [N, A]
         Heat that each action leaves in the laser, at 25 C.
     start_k : float64 [N]
-        Laser temperature before the first frame.
+        ThermalState temperature before the first frame.
     snr : float64 [N, T, A]
         The observed feature `signal_to_noise` after each action.
     span_k : (low, high)
@@ -93,16 +83,16 @@ class DriveTable:
         )
         return cost + laser_cost * surplus
 
-    def consequences(self, laser: Laser) -> Laser:
+    def consequences(self, laser: ThermalState) -> ThermalState:
         """The lasers [N, ...] one frame later, after each action: [N, ..., A]."""
         heat_j = beside(self.heat_j, laser.case_k)
-        before = Laser(*(np.expand_dims(value, -1) for value in laser))
+        before = ThermalState(*(np.expand_dims(value, -1) for value in laser))
         return self.advance(before, np.where(before.tripped, 0.0, heat_j))
 
-    def start(self) -> Laser:
+    def start(self) -> ThermalState:
         """The lasers before the first frame."""
         none = np.zeros(len(self.start_k))
-        return Laser(self.start_k.copy(), none, none.astype(bool))
+        return ThermalState(self.start_k.copy(), none, none.astype(bool))
 
 
 @dataclass(frozen=True)
@@ -113,7 +103,7 @@ class Situation:
     ----------
     frame : int
         Number of the frame.
-    laser : Laser
+    laser : ThermalState
         Of each drive, [N].
     snr : [N]
         Feature `signal_to_noise` of the last acquisition, 0 before the first.
@@ -122,7 +112,7 @@ class Situation:
     """
 
     frame: int
-    laser: Laser
+    laser: ThermalState
     snr: np.ndarray
     table: DriveTable
 
@@ -133,8 +123,8 @@ class Situation:
 
 
 @dataclass(frozen=True)
-class Played:
-    """Drives as they were played.
+class PlayedTable:
+    """Drives of a table as they were played.
 
     Attributes
     ----------
@@ -159,7 +149,7 @@ class Played:
         return float(np.mean(self.actions < 0))
 
 
-def play(table: DriveTable, choose: Choice) -> Played:
+def play(table: DriveTable, choose: Choice) -> PlayedTable:
     """Play every drive of `table`, asking `choose` for the actions [N] of each frame."""
     drives, frames, _ = table.cost.shape
     laser, snr, cost = table.start(), np.zeros(drives), np.zeros(drives)
@@ -172,7 +162,7 @@ def play(table: DriveTable, choose: Choice) -> Played:
         snr = np.where(laser.tripped, snr, table.snr[rows, frame, chosen])
         heat_j = np.where(laser.tripped, 0.0, table.heat_j[rows, chosen])
         laser = table.advance(laser, heat_j)
-    return Played(actions, cost)
+    return PlayedTable(actions, cost)
 
 
 def beside(values: np.ndarray, states: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.utils import seeding
 from torch import Tensor
 
-from agents.optimum.outcome_table import Advance, DriveTable, Laser
+from agents.optimum.outcome_table import Advance, DriveTable, ThermalState
 from agents.policies import SNR_FEATURE
 from shotenv.config import LaserConfig, RewardConfig
 from shotenv.decision import (
@@ -109,14 +109,14 @@ def energy_surplus(temperature_k: np.ndarray, laser: LaserConfig) -> np.ndarray:
 def thermal_model(ambient_k: np.ndarray, laser: LaserConfig, period_s: float) -> Advance:
     """The laser's heat and trip over one frame, for drives with these ambient temperatures [N]."""
 
-    def advance(now: Laser, heat_j: np.ndarray) -> Laser:
+    def advance(now: ThermalState, heat_j: np.ndarray) -> ThermalState:
         around_k = ambient_k.reshape(-1, *[1] * (now.case_k.ndim - 1))
         heat_j = _heat_at(now.temperature_k, heat_j, laser)
         case_k = case_step(now.case_k, heat_j, around_k, laser, period_s)
         rise_k = now.rise_k
         if laser.junction_resistance_k_per_w:
             rise_k = junction_step(rise_k, heat_j, laser, period_s)
-        return Laser(case_k, rise_k, trip_step(now.tripped, case_k + rise_k, laser))
+        return ThermalState(case_k, rise_k, trip_step(now.tripped, case_k + rise_k, laser))
 
     return advance
 

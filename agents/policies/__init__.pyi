@@ -7,6 +7,7 @@ from .guard import (
     GuardedPolicy as GuardedPolicy,
     ThermalGuard as ThermalGuard,
     largest_rises_k as largest_rises_k,
+    thermal_guard as thermal_guard,
 )
 from .learned import (
     PpoPolicy as PpoPolicy,
@@ -15,4 +16,8 @@ from .learned import (
     network_arguments as network_arguments,
 )
 from .policy import Action as Action, Observation as Observation, Policy as Policy
-from .rules import SNR_FEATURE as SNR_FEATURE, SnrThresholdPolicy as SnrThresholdPolicy
+from .rules import (
+    SNR_FEATURE as SNR_FEATURE,
+    SnrThresholdPolicy as SnrThresholdPolicy,
+    rule_in_words as rule_in_words,
+)

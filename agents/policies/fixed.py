@@ -1,16 +1,12 @@
-"""TODO."""
+"""Policies that look at nothing: always the same shots, in turn, or drawn at random."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from unwrap.signal import Shots
-
-if TYPE_CHECKING:
-    pass
 from agents.policies.policy import (
     Action,
     Observation,
@@ -20,6 +16,7 @@ from agents.policies.policy import (
     like,
     single,
 )
+from unwrap.signal import Shots
 
 
 class FixedPolicy(Policy):
@@ -56,21 +53,33 @@ class RandomPolicy(Policy):
 
 
 class CyclePolicy(Policy):
-    """`shots` in every `period`-th frame, starting with the first, and `otherwise` between."""
+    """`shots` in every `period`-th frame, starting with the first, and `otherwise` between.
+
+    Examples
+    --------
+    >>> print(CyclePolicy(4, shots=8, otherwise=2))
+    8 DCS every 4th frame, else 2
+    """
 
     def __init__(self, period: int, shots: int = 8, otherwise: int = 2) -> None:
         if period < 2:
             raise ValueError(f"period is {period}; expected at least 2 frames")
         self._period = period
-        self._actions = checked_shots(shots).action, checked_shots(otherwise).action
+        self._shots, self._otherwise = checked_shots(shots), checked_shots(otherwise)
         self.reset()
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
         """The action that the frame's place in the cycle asks for."""
-        action = self._actions[self._frame % self._period != 0]
+        special = self._frame % self._period == 0
         self._frame += 1
-        return like(observation, action)
+        return like(observation, (self._shots if special else self._otherwise).action)
 
     def reset(self) -> None:
         """Start the cycle at its first frame."""
         self._frame = 0
+
+    def __str__(self) -> str:
+        """The rule in words."""
+        teens = 10 < self._period % 100 < 20
+        ending = "th" if teens else {1: "st", 2: "nd", 3: "rd"}.get(self._period % 10, "th")
+        return f"{self._shots} DCS every {self._period}{ending} frame, else {self._otherwise}"

@@ -7,21 +7,17 @@ temperature; so it is left to a rule, and learning is about everything else.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
-
-from shotenv.decision import feature_index
-from unwrap.signal import Shots
-
-if TYPE_CHECKING:
-    pass
 import torch
 
+from agents.config import DemoConfig
 from agents.policies.policy import Action, Observation, Policy, single
 from shotenv.config import EnvConfig
-from shotenv.decision import heat_margin_k
+from shotenv.decision import FEATURE_NAMES, feature_index, heat_margin_k
 from shotenv.laser import laser_step, shot_cost, start_laser
+from unwrap.signal import Shots
 
 MARGIN_FEATURE: Final = "heat_margin"
 
@@ -45,8 +41,15 @@ class ThermalGuard:
     def __call__(self, observation: Any, actions: Any) -> np.ndarray:
         """The actions [N] (or []) that are allowed in place of `actions`."""
         margin_k = heat_margin_k(np.asarray(observation)[..., self._index])
+        # The margins rise with the shots, so counting those that are met gives the highest action.
         highest = sum((margin_k >= needed).astype(np.int64) for needed in self.needed_k[1:])
         return np.minimum(actions, highest)
+
+
+def thermal_guard(config: DemoConfig) -> ThermalGuard:
+    """The guard of `config`: `agent.guard` times the most that a frame can warm the laser by."""
+    needed_k = [config.agent.guard * rise_k for rise_k in largest_rises_k(config.env)]
+    return ThermalGuard(FEATURE_NAMES, needed_k)
 
 
 def largest_rises_k(config: EnvConfig) -> tuple[float, ...]:

@@ -1,4 +1,4 @@
-"""TODO."""
+"""Schedulers that were trained, and the folders that they are saved in."""
 
 from __future__ import annotations
 
@@ -9,16 +9,41 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from pydantic import ValidationError
 
 from agents.config import AgentConfig
 from agents.policies.guard import ThermalGuard
+from agents.policies.policy import Action, Observation, Policy, single
 from unwrap.signal import Shots
+from unwrap.support import Section, write_bytes, write_json
 
 if TYPE_CHECKING:
     from stable_baselines3.common.policies import ActorCriticPolicy
-from agents.policies.policy import Action, Observation, Policy, single
 
-AGENT_SCHEMA: Final = 2
+AGENT_SCHEMA: Final = 3
+WEIGHTS: Final = "policy.safetensors"
+DESCRIPTION: Final = "agent.json"
+
+
+class Description(Section):
+    """What `agent.json` holds beside its schema.
+
+    Attributes
+    ----------
+    agent : AgentConfig
+        How the scheduler was trained; its network is built anew from that.
+    feature_names : tuple of str
+        Elements of the observation, in order.
+    guard_needed_k : (float, float, float)
+        Margin to the laser's trip that each action needs, kelvin.
+    versions : dict of str to str
+        Of the packages that it was trained with.
+    """
+
+    agent: AgentConfig
+    feature_names: tuple[str, ...]
+    guard_needed_k: tuple[float, float, float]
+    versions: dict[str, str]
 
 
 class PpoPolicy(Policy):
@@ -48,21 +73,17 @@ class PpoPolicy(Policy):
         """Write `policy.safetensors`, then `agent.json`, each atomically."""
         from safetensors.torch import save
 
-        from unwrap.support import write_bytes, write_json
-
-        folder.mkdir(parents=True, exist_ok=True)
+        description = Description(
+            agent=self.config,
+            feature_names=self.feature_names,
+            guard_needed_k=self.guard.needed_k,
+            versions={name: version(name) for name in ("stable-baselines3", "torch")},
+        )
         tensors = {name: value.contiguous() for name, value in self.network.state_dict().items()}
-        write_bytes(folder / "policy.safetensors", save(tensors))
-        write_json(folder / "agent.json", self._description())
-
-    def _description(self) -> dict[str, Any]:
-        return {
-            "schema": AGENT_SCHEMA,
-            "agent": self.config.model_dump(mode="json"),
-            "feature_names": list(self.feature_names),
-            "guard_needed_k": list(self.guard.needed_k),
-            "versions": {name: version(name) for name in ("stable-baselines3", "torch")},
-        }
+        write_bytes(folder / WEIGHTS, save(tensors))
+        write_json(
+            folder / DESCRIPTION, {"schema": AGENT_SCHEMA, **description.model_dump(mode="json")}
+        )
 
     @classmethod
     def load(cls, folder: Path) -> PpoPolicy:
@@ -71,20 +92,24 @@ class PpoPolicy(Policy):
         Raises
         ------
         ValueError
-            The folder holds no scheduler, or a damaged one; the message names the file.
+            The folder holds no scheduler, one of another version, or a damaged one; the message
+            names the file.
         """
         from safetensors.torch import load_file
 
-        description = _read_description(folder / "agent.json")
-        config = AgentConfig.model_validate(description["agent"])
-        guard = ThermalGuard(description["feature_names"], description["guard_needed_k"])
-        network = build_network(len(guard.feature_names), config)
-        weights = folder / "policy.safetensors"
+        described = folder / DESCRIPTION
+        description = read_description(described)
+        try:
+            guard = ThermalGuard(description.feature_names, description.guard_needed_k)
+        except ValueError as error:
+            raise ValueError(f"{described}: feature_names: {error}") from None
+        network = build_network(len(guard.feature_names), description.agent)
+        weights = folder / WEIGHTS
         try:
             network.load_state_dict(load_file(weights))
         except Exception as error:  # safetensors has an error type of its own per fault
             raise ValueError(f"{weights} is not a usable network: {first_line(error)}") from None
-        return cls(network, config, guard)
+        return cls(network, description.agent, guard)
 
 
 def build_network(features: int, config: AgentConfig) -> ActorCriticPolicy:
@@ -105,20 +130,39 @@ def network_arguments(config: AgentConfig) -> dict[str, Any]:
     return {"net_arch": list(config.hidden)}
 
 
-def _read_description(path: Path) -> dict[str, Any]:
+def read_description(path: Path) -> Description:
+    """What an `agent.json` says.
+
+    Raises
+    ------
+    ValueError
+        It is missing, damaged, of another schema, or has a field that is missing, unknown or of no
+        use; the message names the file, and the field.
+    """
     try:
-        description = json.loads(path.read_text(encoding="utf-8"))
-        found = description["schema"]
+        content = json.loads(path.read_text(encoding="utf-8"))
+        schema = content.pop("schema")
     except FileNotFoundError:
         raise ValueError(
             f"{path.parent} holds no scheduler ({path.name} is missing); "
             "`shotenv train --out DIR` makes one"
         ) from None
-    except (UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError):
+    except (UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError, AttributeError):
         raise ValueError(f"{path} is damaged; expected the description of a scheduler") from None
-    if found != AGENT_SCHEMA:
-        raise ValueError(f"{path} has schema {found!r}; this version reads {AGENT_SCHEMA}")
-    return description
+    if schema != AGENT_SCHEMA:
+        raise ValueError(
+            f"{path} has schema {schema!r}, but this version reads {AGENT_SCHEMA}; "
+            "train the scheduler again (`shotenv train --out DIR`)"
+        )
+    try:
+        return Description.model_validate(content)
+    except ValidationError as error:
+        fault = error.errors()[0]
+        field = ".".join(map(str, fault["loc"]))
+        got = "" if fault["type"] == "missing" else f", got {fault['input']!r}"
+        raise ValueError(
+            f"{path}: {field}: {fault['msg'].lower()}{got}; expected what `shotenv train` writes"
+        ) from None
 
 
 def first_line(error: Exception) -> str:

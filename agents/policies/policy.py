@@ -8,21 +8,29 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from unwrap.signal import Shots
-
-if TYPE_CHECKING:
-    pass
 
 Action = Any
 Observation = Any
 
 
 class Policy(ABC):
-    """Chooses an action, 0 = 2 DCS, 1 = 4 DCS, 2 = 8 DCS, from what is observed."""
+    """Chooses an action, 0 = 2 DCS, 1 = 4 DCS, 2 = 8 DCS, from what is observed.
+
+    Examples
+    --------
+    A policy of your own is a class with `act`:
+
+    >>> class Dim(Policy):
+    ...     def act(self, observation, info=None):
+    ...         return single(np.where(np.asarray(observation)[..., 0] < 0.1, 2, 0))
+    >>> Dim().act(np.array([[0.05], [0.7]]))
+    array([2, 0])
+    """
 
     @abstractmethod
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:

@@ -1,17 +1,14 @@
-"""TODO."""
+"""Rules that a person can read off: one threshold on one feature."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
-from shotenv.decision import feature_index
-
-if TYPE_CHECKING:
-    pass
 from agents.policies.policy import Action, Observation, Policy, checked_shots, single
+from shotenv.decision import feature_index
 
 SNR_FEATURE: Final = "signal_to_noise"
 
@@ -43,4 +40,15 @@ class SnrThresholdPolicy(Policy):
 
     def __str__(self) -> str:
         """The rule in words."""
-        return f"{self.below:d} DCS where {SNR_FEATURE} < {self.threshold:.3f}, else {self.above:d}"
+        return rule_in_words(self.threshold, self.below, self.above)
+
+
+def rule_in_words(threshold: float, below: int, above: int) -> str:
+    """A one-threshold rule that takes `below` or `above` shots.
+
+    Examples
+    --------
+    >>> rule_in_words(0.25, below=8, above=2)
+    '8 DCS where signal_to_noise < 0.250, else 2'
+    """
+    return f"{below:d} DCS where {SNR_FEATURE} < {threshold:.3f}, else {above:d}"

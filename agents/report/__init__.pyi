@@ -1,13 +1,4 @@
+from .evaluation_files import write_evaluation as write_evaluation
 from .page import write_report as write_report
-from .results import (
-    DRIVES as DRIVES,
-    FRAMES as FRAMES,
-    RESULTS as RESULTS,
-    TIMELINE as TIMELINE,
-    rival_note as rival_note,
-    verdict as verdict,
-    write_drives as write_drives,
-    write_results as write_results,
-    write_strip as write_strip,
-)
+from .results import rival_note as rival_note, verdict as verdict
 from .strip import take_strip as take_strip

@@ -9,9 +9,12 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from agents.report.results import label
+from unwrap.signal import Shots
 
-SHOTS = (2, 4, 8)
-SHOT_COLORS = ("#9ecae1", "#4292c6", "#08407f")
+SHOT_COLORS = {Shots.TWO: "#9ecae1", Shots.FOUR: "#4292c6", Shots.EIGHT: "#08407f"}
+LEVELS = (0, *Shots)
+"""Samples taken, bottom to top of the time line; 0: the laser was off."""
+SYMBOLS = {"ppo": "star", "snr_threshold": "diamond", "random": "x", "cycle": "square"}
 ACCENT, MUTED, INK = "#c2410c", "#64748b", "#1e293b"
 FAMILY_COLORS = {
     "sunny_road": "#fde68a",
@@ -21,6 +24,8 @@ FAMILY_COLORS = {
     "night_road": "#b7bfdc",
 }
 FONT = {"family": "Inter, system-ui, 'Segoe UI', Roboto, sans-serif", "size": 13, "color": INK}
+AXIS = {"gridcolor": "#e2e8f0", "zeroline": False}
+LEGEND = {"orientation": "h", "x": 1.0, "xanchor": "right", "y": 1.12, "yanchor": "bottom"}
 CONFIG = {"displaylogo": False, "responsive": True, "displayModeBar": False}
 
 
@@ -48,7 +53,11 @@ def error_against_energy(results: dict[str, Any]) -> go.Figure:
             error_x=_whiskers(energy, color),
             error_y=_whiskers(error, color),
             mode="markers",
-            marker={"size": 13 if chosen else 10, "color": color, "symbol": _symbol(name)},
+            marker={
+                "size": 13 if chosen else 10,
+                "color": color,
+                "symbol": SYMBOLS.get(name, "circle"),
+            },
             name=label(name),
             hovertemplate="%{x:.1f} J<br>%{y:.3f} m<extra>" + label(name) + "</extra>",
         )
@@ -82,20 +91,21 @@ def shares_by_family(results: dict[str, Any], names: tuple[str, ...]) -> go.Figu
         shares |= results["families"][name]
         families = [_family(family) for family in reversed(shares)]
         table = np.array(list(reversed(shares.values())))
-        for action, shots in enumerate(SHOTS):
+        for shots, color in SHOT_COLORS.items():
+            share_of_shots = table[:, shots.action]
             figure.add_bar(
-                x=table[:, action],
+                x=share_of_shots,
                 y=families,
                 orientation="h",
                 name=f"{shots} DCS",
                 legendgroup=str(shots),
                 showlegend=column == 1,
-                marker={"color": SHOT_COLORS[action], "line": {"color": "white", "width": 1}},
-                text=[f"{share:.0%}" if share >= 0.08 else "" for share in table[:, action]],
+                marker={"color": color, "line": {"color": "white", "width": 1}},
+                text=[f"{share:.0%}" if share >= 0.08 else "" for share in share_of_shots],
                 textposition="inside",
                 insidetextanchor="middle",
                 textangle=0,
-                insidetextfont={"color": INK if action == 0 else "white", "size": 12},
+                insidetextfont={"color": INK if shots == Shots.TWO else "white", "size": 12},
                 hovertemplate="%{y}: %{x:.1%}<extra>" + f"{shots} DCS</extra>",
                 row=1,
                 col=column,
@@ -117,10 +127,13 @@ def timeline(record: dict[str, Any], scheduler: str, fixed: str) -> go.Figure:
     seconds = np.arange(len(record["family"])) / record["frame_rate_hz"]
     for name, color, width in ((fixed, MUTED, 1.3), (scheduler, ACCENT, 1.9)):
         played = record["policies"][name]
-        style = {"line": {"color": color, "width": width}, "legendgroup": name, "mode": "lines"}
-        shots = {"x": seconds, "y": [_level(value) for value in played["shots"]]}
+        line = {"color": color, "width": width}
+        style = {"line": line, "legendgroup": name, "mode": "lines"}
+        # Shots change from frame to frame, not between: a stair, where the others are lines.
+        stair = {**style, "line": {**line, "shape": "hv"}}
+        levels = [LEVELS.index(shots) for shots in played["shots"]]
         figure.add_scatter(
-            **shots, **_step(style), name=label(name), showlegend=False, row=1, col=1
+            x=seconds, y=levels, **stair, name=label(name), showlegend=False, row=1, col=1
         )
         figure.add_scatter(
             x=seconds, y=played["depth_mae_m"], **style, name=label(name), row=2, col=1
@@ -132,8 +145,9 @@ def timeline(record: dict[str, Any], scheduler: str, fixed: str) -> go.Figure:
     _limit(figure, record["trip_k"], "laser trips")
     _limit(figure, record["release_k"], "laser comes back")
     _family_bands(figure, record["family"], record["frame_rate_hz"])
+    names = ["off", *map(str, Shots)]
     figure.update_yaxes(
-        title="shots", tickvals=[0, 1, 2, 3], ticktext=["off", "2", "4", "8"], row=1, **AXIS
+        title="shots", tickvals=list(range(len(LEVELS))), ticktext=names, row=1, **AXIS
     )
     figure.update_yaxes(range=[-0.35, 3.35], row=1)
     figure.update_yaxes(title="depth error, m", rangemode="tozero", row=2, **AXIS)
@@ -142,10 +156,6 @@ def timeline(record: dict[str, Any], scheduler: str, fixed: str) -> go.Figure:
     figure.update_xaxes(title="time in the drive, s", row=3)
     figure.update_layout(hovermode="x", legend=LEGEND | {"y": 1.07})
     return _styled(figure, height=650, top=80)
-
-
-AXIS = {"gridcolor": "#e2e8f0", "zeroline": False}
-LEGEND = {"orientation": "h", "x": 1.0, "xanchor": "right", "y": 1.12, "yanchor": "bottom"}
 
 
 def _styled(
@@ -174,23 +184,8 @@ def _whiskers(interval: dict[str, float], color: str) -> dict[str, Any]:
     }
 
 
-def _symbol(name: str) -> str:
-    return {"ppo": "star", "snr_threshold": "diamond", "random": "x", "cycle": "square"}.get(
-        name, "circle"
-    )
-
-
 def _family(name: str) -> str:
     return name.replace("_", " ")
-
-
-def _level(shots: int) -> int:
-    """Height in the time line: off, 2, 4, 8."""
-    return (0, *SHOTS).index(shots)
-
-
-def _step(style: dict[str, Any]) -> dict[str, Any]:
-    return {**style, "line": {**style["line"], "shape": "hv"}}
 
 
 def _limit(figure: go.Figure, temperature_k: float, text: str) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jinja2
 import numpy as np
@@ -23,11 +24,12 @@ from agents.report.results import (
     verdict,
 )
 from unwrap.pictures import CYCLIC, ERROR, GRAY, VIRIDIS, ColorMap, picture
+from unwrap.signal import GRAY_FULL_SCALE
 from unwrap.support import write_text
 
 REPORT = "report.html"
 LARGEST_ERROR_M = 1.0
-GRAY_GAMMA = 0.5  # a 12-bit linear image is too dark to look at
+GRAY_GAMMA = 0.5  # a linear image is too dark to look at
 
 
 def write_report(folder: Path) -> Path:
@@ -58,6 +60,7 @@ def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip) -
         autoescape=True,
         undefined=jinja2.StrictUndefined,
     )
+    panels = panels_of(strip, results["config"]["env"]["sensor"]["f1_hz"])
     scheduler, fixed = results["scheduler"], results["best_fixed"]
     compared = tuple(name for name in (scheduler, "snr_threshold") if name in results["policies"])
     return environment.get_template("report.html.jinja").render(
@@ -67,13 +70,15 @@ def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip) -
         label=label,
         rows=_rows(results),
         cards=_cards(results),
-        panels=_panels(strip),
-        frames=json.dumps(_frames(strip)),
+        panels=[{"key": key, "title": panel.title, **panel.scale} for key, panel in panels.items()],
+        frames=json.dumps(_frames(strip, panels)),
         families=list(dict.fromkeys(strip.family.tolist())),
         scatter=charts.figure_html(charts.error_against_energy(results)),
         shares=charts.figure_html(charts.shares_by_family(results, compared)),
         timeline=charts.figure_html(charts.timeline(played, scheduler, fixed)),
         drive=played["drive"],
+        split=results["config"]["study"]["split"],
+        shot_colors={str(shots): color for shots, color in charts.SHOT_COLORS.items()},
         plotly=get_plotlyjs(),
     )
 
@@ -129,42 +134,65 @@ def _card(title: str, unit: str, ours: dict, theirs: dict, against: str) -> dict
     }
 
 
-def _color_maps(strip: Strip) -> dict[str, ColorMap]:
-    range_m, unambiguous_m = float(strip.max_range_m), float(strip.unambiguous_m)
+class Panel(NamedTuple):
+    """One picture of a frame.
+
+    Attributes
+    ----------
+    title : str
+    colors : ColorMap
+    values : callable
+        What is painted of frame i of a strip, [H, W]; NaN where there is nothing to show.
+    """
+
+    title: str
+    colors: ColorMap
+    values: Callable[[Strip, int], np.ndarray]
+
+    @property
+    def scale(self) -> dict[str, Any]:
+        """The colour bar under the picture."""
+        return {"css": self.colors.css, "ticks": self.colors.ticks, "unit": self.colors.unit}
+
+
+def panels_of(strip: Strip, f1_hz: float) -> dict[str, Panel]:
+    """The pictures of each frame, by the name that the page's script knows them by."""
+    distance = ColorMap(0.0, float(strip.max_range_m), "m", VIRIDIS)
+    around = ColorMap(0.0, float(strip.unambiguous_m), "m, wraps around", CYCLIC)
+    gray = ColorMap(0.0, 1.0, f"share of full scale, gamma {GRAY_GAMMA:g}", GRAY)
+    error = ColorMap(0.0, LARGEST_ERROR_M, "m, clipped above", ERROR)
     return {
-        "gray": ColorMap(0.0, 1.0, "share of full scale, gamma 0.5", GRAY),
-        "wrapped": ColorMap(0.0, unambiguous_m, "m, wraps around", CYCLIC),
-        "corrected": ColorMap(0.0, range_m, "m", VIRIDIS),
-        "truth": ColorMap(0.0, range_m, "m", VIRIDIS),
-        "error": ColorMap(0.0, LARGEST_ERROR_M, "m, clipped above", ERROR),
+        "gray": Panel("Gray image", gray, gray_shown),
+        "wrapped": Panel(
+            f"Wrapped map, {f1_hz / 1e6:g} MHz",
+            around,
+            lambda strip, i: np.where(strip.valid[i], strip.wrapped_m[i], np.nan),
+        ),
+        "corrected": Panel("Corrected depth", distance, valid_m),
+        "truth": Panel("True depth", distance, scored_m),
+        "error": Panel(
+            "Absolute error", error, lambda strip, i: np.abs(valid_m(strip, i) - scored_m(strip, i))
+        ),
     }
 
 
-TITLES = {
-    "gray": "Gray image",
-    "wrapped": "Wrapped map, 24 MHz",
-    "corrected": "Corrected depth",
-    "truth": "True depth",
-    "error": "Absolute error",
-}
+def gray_shown(strip: Strip, i: int) -> np.ndarray:
+    """Gray image as a share of full scale, brightened."""
+    return (strip.gray_lsb[i] / float(GRAY_FULL_SCALE)) ** GRAY_GAMMA
 
 
-def _panels(strip: Strip) -> list[dict[str, Any]]:
-    return [
-        {
-            "key": key,
-            "title": TITLES[key],
-            "css": colors.css,
-            "ticks": colors.ticks,
-            "unit": colors.unit,
-        }
-        for key, colors in _color_maps(strip).items()
-    ]
+def valid_m(strip: Strip, i: int) -> np.ndarray:
+    """Corrected depth where the sensor calls it valid, metres."""
+    return np.where(strip.valid[i], strip.corrected_m[i], np.nan)
 
 
-def _frames(strip: Strip) -> list[dict[str, Any]]:
+def scored_m(strip: Strip, i: int) -> np.ndarray:
+    """True depth within the scored range, metres."""
+    return np.where(strip.truth_m[i] <= strip.max_range_m, strip.truth_m[i], np.nan)
+
+
+def _frames(strip: Strip, panels: dict[str, Panel]) -> list[dict[str, Any]]:
     """Pictures and caption of every frame of the strip."""
-    maps = _color_maps(strip)
     return [
         {
             "family": str(strip.family[i]),
@@ -174,21 +202,8 @@ def _frames(strip: Strip) -> list[dict[str, Any]]:
             "mae": None if np.isnan(strip.depth_mae_m[i]) else float(strip.depth_mae_m[i]),
             "valid": float(strip.valid[i].mean()),
             "images": {
-                key: picture(values, maps[key]) for key, values in _quantities(strip, i).items()
+                key: picture(panel.values(strip, i), panel.colors) for key, panel in panels.items()
             },
         }
         for i in range(len(strip.frame))
     ]
-
-
-def _quantities(strip: Strip, i: int) -> dict[str, np.ndarray]:
-    """Quantities of frame `i` as they are shown: only valid depth, only scored truth."""
-    truth_m = np.where(strip.truth_m[i] <= strip.max_range_m, strip.truth_m[i], np.nan)
-    corrected_m = np.where(strip.valid[i], strip.corrected_m[i], np.nan)
-    return {
-        "gray": (strip.gray_lsb[i] / 4095.0) ** GRAY_GAMMA,
-        "wrapped": np.where(strip.valid[i], strip.wrapped_m[i], np.nan),
-        "corrected": corrected_m,
-        "truth": truth_m,
-        "error": np.abs(corrected_m - truth_m),
-    }

@@ -18,8 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from unwrap.support import write_bytes, write_json, write_text
+from unwrap.support import write_bytes, write_text
 
+CURE = "`shotenv evaluate` writes it"
 RESULTS, DRIVES, TIMELINE, FRAMES = "results.json", "drives.csv", "timeline.json", "frames.npz"
 LABELS = {
     "ppo": "PPO scheduler",
@@ -81,7 +82,7 @@ def verdict(results: dict[str, Any]) -> str:
     pair = results["paired_to_best_fixed"][scheduler]
     interval = f"{results['confidence']:.0%} interval {pair['low']:+.1f} to {pair['high']:+.1f}"
     against = f"the best fixed choice, {_in_a_sentence(fixed)}"
-    drives = f"over {results['drives']} test drives"
+    drives = f"over {results['drives']} {results['config']['study']['split']} drives"
     if pair["low"] <= 0.0 <= pair["high"]:
         return (
             f"No significant difference: the trained scheduler's return is "
@@ -162,11 +163,3 @@ def read_json(path: Path) -> dict[str, Any]:
     if not isinstance(content, dict):
         raise ValueError(f"{path} is damaged (not a table); {CURE}")
     return content
-
-
-CURE = "`shotenv evaluate` writes it"
-
-
-def write_results(path: Path, results: dict[str, Any]) -> None:
-    """Means and intervals of every policy."""
-    write_json(path, results)

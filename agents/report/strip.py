@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from agents.evaluation import Played
+from agents.evaluation import PlayedDrives
 from agents.optimum import drive_of
 from agents.report.results import Strip
 from shotenv.decision import Drive, Problem, acquire_depth
@@ -18,7 +18,7 @@ from unwrap.signal import Shots, unambiguous_range_m
 FRAMES_PER_FAMILY = 8
 
 
-def take_strip(problem: Problem, played: Played) -> Strip:
+def take_strip(problem: Problem, played: PlayedDrives) -> Strip:
     """A run of frames of each scene family in `played`, taken again with the same noise."""
     chosen = list(_runs(played))
     drives = {i: drive_of(problem, int(played.seeds[i])) for i, _ in chosen}
@@ -45,7 +45,7 @@ def take_strip(problem: Problem, played: Played) -> Strip:
     )
 
 
-def _runs(played: Played) -> Iterator[tuple[int, int]]:
+def _runs(played: PlayedDrives) -> Iterator[tuple[int, int]]:
     """(drive, frame) of some consecutive frames of each family: a run with many choices of shots.
 
     A run in which the scheduler changes its mind shows more than one in which it does not.
@@ -56,7 +56,7 @@ def _runs(played: Played) -> Iterator[tuple[int, int]]:
         yield from max(runs, key=lambda run: (len(run), len({played.shots[at] for at in run})))
 
 
-def _run(played: Played, drive: int, start: int, family: str) -> list[tuple[int, int]]:
+def _run(played: PlayedDrives, drive: int, start: int, family: str) -> list[tuple[int, int]]:
     end = start
     while end < min(start + FRAMES_PER_FAMILY, played.shots.shape[1]):
         if played.family[drive, end] != family or played.shots[drive, end] == 0:
@@ -65,7 +65,7 @@ def _run(played: Played, drive: int, start: int, family: str) -> list[tuple[int,
     return [(drive, frame) for frame in range(start, end)]
 
 
-def _power_w(problem: Problem, drive: Drive, played: Played, row: int, frame: int) -> Tensor:
+def _power_w(problem: Problem, drive: Drive, played: PlayedDrives, row: int, frame: int) -> Tensor:
     """The laser's power in a frame, after derating."""
     told_k = torch.tensor(played.temperature_k[[row], max(frame - 1, 0)])
     start_k = told_k if frame else drive.start_k

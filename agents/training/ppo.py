@@ -36,8 +36,18 @@ Validate = Callable[[PpoPolicy], float]
 
 
 @dataclass(frozen=True)
-class Progress:
-    """How far a run has come: finished rounds, best validation return and its round."""
+class TrainingState:
+    """How far a run has come.
+
+    Attributes
+    ----------
+    rounds : int
+        Finished rounds.
+    best_return : float
+        Best return on validation drives so far.
+    best_round : int
+        Finished rounds when it was found; -1 before the first validation.
+    """
 
     rounds: int = 0
     best_return: float = -math.inf
@@ -82,13 +92,27 @@ class Trainer:
     ) -> None:
         self._envs, self._config, self._validate, self._out = envs, config, validate, out
         self._warm = warm
-        self._ppo = build_ppo(envs, config)
-        self.policy = PpoPolicy(self._ppo.policy, config, guard)
-        self._drives = training_drives(config)
-        self._few = config.drives < config.num_envs
+        # A round is whole updates, enough of them to see a drive from its first frame to its last.
         updates = math.ceil(frames_per_drive / config.rollout_steps)
         self._round_steps = updates * config.rollout_steps * config.num_envs
         self._rounds = math.ceil(config.total_steps / self._round_steps)
+        self._learning_rate = config.learning_rate
+        self._ppo = PPO(
+            "MlpPolicy",
+            envs,
+            learning_rate=lambda remaining: self._learning_rate,
+            n_steps=config.rollout_steps,
+            batch_size=config.batch_size,
+            n_epochs=config.epochs,
+            gamma=config.gamma,
+            gae_lambda=config.gae_lambda,
+            ent_coef=config.entropy_coefficient,
+            policy_kwargs=network_arguments(config),
+            seed=config.seed,
+            device="cpu",
+        )
+        self.policy = PpoPolicy(self._ppo.policy, config, guard)
+        # What a checkpoint must have been made with to be continued here.
         self._identity = json.dumps(
             {
                 "agent": config.model_dump(mode="json"),
@@ -105,37 +129,35 @@ class Trainer:
         KeyboardInterrupt
             Ctrl-C; the checkpoint of the last finished round is kept.
         """
+        config, drives = self._config, training_drives(self._config)
         self._out.mkdir(parents=True, exist_ok=True)
         state = self._load()
-        if state == Progress() and self._warm is not None:
+        if state == TrainingState() and self._warm is not None:
             self._warm(self._ppo.policy)
             state = self._judged(state)
             self._save(state)
         done = state.rounds * self._round_steps
         with progress(self._rounds * self._round_steps, "training", "step", done=done) as bar:
             while state.rounds < self._rounds:
-                self._train_round(state.rounds, bar)
+                # All randomness of a round comes from its number, so that a resumed run draws what
+                # an uninterrupted one does.
+                generator = np.random.default_rng((config.seed, state.rounds))
+                set_random_seed(int(generator.integers(2**31)))
+                few = config.drives < config.num_envs
+                self._envs.seed_all(generator.choice(drives, config.num_envs, replace=few).tolist())
+                # It falls linearly, round by round, to a tenth.
+                self._learning_rate = config.learning_rate * (
+                    1.0 - 0.9 * state.rounds / self._rounds
+                )
+                # `learn` counts its steps from 0, and therefore resets the environments first:
+                # network and optimiser are all that it keeps from the round before.
+                self._ppo.learn(self._round_steps, callback=_Ticks(bar))
                 state = replace(self._judged(state), rounds=state.rounds + 1)
                 bar.set_postfix_str(f"validation return {state.best_return:.1f}", refresh=False)
                 self._save(state)
         return PpoPolicy.load(self._out)
 
-    def _train_round(self, number: int, bar: tqdm) -> None:
-        generator = np.random.default_rng((self._config.seed, number))
-        set_random_seed(int(generator.integers(2**31)))
-        drives = generator.choice(self._drives, self._config.num_envs, replace=self._few)
-        self._envs.seed_all(drives.tolist())
-        self._ppo._last_obs = None  # makes `learn` reset the environments
-        self._ppo.num_timesteps = number * self._round_steps
-        self._anneal(number)
-        self._ppo.learn(self._round_steps, callback=_Ticks(bar), reset_num_timesteps=False)
-
-    def _anneal(self, number: int) -> None:
-        """The learning rate falls linearly, round by round, to a tenth."""
-        rate = self._config.learning_rate * (1.0 - 0.9 * number / self._rounds)
-        self._ppo.lr_schedule = lambda _: rate
-
-    def _judged(self, state: Progress) -> Progress:
+    def _judged(self, state: TrainingState) -> TrainingState:
         """`state` with the return of the policy as it is, which is kept where it is the best."""
         found = self._validate(self.policy)
         if found <= state.best_return:
@@ -143,14 +165,14 @@ class Trainer:
         self.policy.save(self._out)
         return replace(state, best_return=found, best_round=state.rounds)
 
-    def _save(self, state: Progress) -> None:
+    def _save(self, state: TrainingState) -> None:
         words = {"schema": SCHEMA, "identity": self._identity, "progress": json.dumps(vars(state))}
         write_bytes(self._out / CHECKPOINT, save(_tensors(self._ppo), words))
 
-    def _load(self) -> Progress:
+    def _load(self) -> TrainingState:
         path = self._out / CHECKPOINT
         if not path.exists():
-            return Progress()
+            return TrainingState()
         try:
             with safe_open(path, framework="pt") as file:
                 words = dict(file.metadata() or {})
@@ -158,7 +180,7 @@ class Trainer:
             same = (words["schema"], words["identity"]) == (SCHEMA, self._identity)
             if same:
                 _restore(self._ppo, tensors)
-            state = Progress(**json.loads(words["progress"]))
+            state = TrainingState(**json.loads(words["progress"]))
         except (SafetensorError, OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
             raise ValueError(
                 f"{path} is damaged ({first_line(error)}); delete it to start anew"
@@ -173,24 +195,6 @@ class Trainer:
 def training_drives(config: AgentConfig) -> np.ndarray:
     """Seeds of the drives that a scheduler is trained on."""
     return np.random.SeedSequence(config.seed).generate_state(config.drives)
-
-
-def build_ppo(envs: Sb3VecEnv, config: AgentConfig) -> PPO:
-    """An untrained PPO as `config` says."""
-    return PPO(
-        "MlpPolicy",
-        envs,
-        learning_rate=config.learning_rate,
-        n_steps=config.rollout_steps,
-        batch_size=config.batch_size,
-        n_epochs=config.epochs,
-        gamma=config.gamma,
-        gae_lambda=config.gae_lambda,
-        ent_coef=config.entropy_coefficient,
-        policy_kwargs=network_arguments(config),
-        seed=config.seed,
-        device="cpu",
-    )
 
 
 class _Ticks(BaseCallback):

@@ -34,22 +34,26 @@ class Sb3VecEnv(VecEnv):
             raise ValueError(f"autoreset_mode is {mode}; stable-baselines3 needs SameStep")
         self.envs = envs
         self._actions: np.ndarray | None = None
+        self._reset_with: list[int | None] | None = None
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
-    def reset(self) -> Any:
-        """Start all environments anew; seeds given by `seed` count once."""
-        seeded = any(seed is not None for seed in self._seeds)
-        # A sequence with one seed per environment; gymnasium's annotation forgets it.
-        seeds: Any = list(self._seeds) if seeded else None
-        observations, infos = self.envs.reset(seed=seeds)
-        self.reset_infos = split_infos(infos, self.num_envs)
-        self._reset_seeds()
-        self._reset_options()
-        return observations
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Seeds of the environments at the next `reset`: `seed`, `seed` + 1 and so on."""
+        self._reset_with = list(super().seed(seed))
+        return self._reset_with
 
     def seed_all(self, seeds: Sequence[int]) -> None:
         """Seeds of the environments at the next `reset`, one each."""
-        self._seeds = list(seeds)
+        self._reset_with = list(seeds)
+
+    def reset(self) -> Any:
+        """Start all environments anew; seeds that were given count once."""
+        # A sequence with one seed per environment; gymnasium's annotation forgets it.
+        seeds: Any = self._reset_with
+        observations, infos = self.envs.reset(seed=seeds)
+        self.reset_infos = split_infos(infos, self.num_envs)
+        self._reset_with = None
+        return observations
 
     def step_async(self, actions: np.ndarray) -> None:
         """Keep the actions for `step_wait`."""
@@ -75,7 +79,7 @@ class Sb3VecEnv(VecEnv):
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """An attribute of the batch, once per chosen environment."""
-        return [getattr(self.envs, attr_name) for _ in self._get_indices(indices)]
+        return [getattr(self.envs, attr_name) for _ in self._chosen(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Refused: the batch has no environments of its own to set attributes on."""
@@ -89,7 +93,13 @@ class Sb3VecEnv(VecEnv):
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """No environment of a native batch is wrapped."""
-        return [False for _ in self._get_indices(indices)]
+        return [False for _ in self._chosen(indices)]
+
+    def _chosen(self, indices: int | Iterable[int] | None) -> Iterable[int]:
+        """Numbers of the environments that `indices` picks: all, one, or some."""
+        if indices is None:
+            return range(self.num_envs)
+        return [indices] if isinstance(indices, int) else indices
 
     def get_images(self) -> Sequence[np.ndarray | None]:
         """Nothing: a batch is not drawn."""
@@ -107,11 +117,8 @@ def split_infos(infos: dict[str, Any], count: int) -> list[dict[str, Any]]:
         if key.startswith("_"):
             continue
         held = infos.get(f"_{key}")
+        holders = range(count) if held is None else np.flatnonzero(held)
         parts = split_infos(values, count) if isinstance(values, dict) else values
-        for i in _holders(held, count):
+        for i in holders:
             each[i][key] = parts[i]
     return each
-
-
-def _holders(mask: np.ndarray | None, count: int) -> Iterable[int]:
-    return range(count) if mask is None else np.flatnonzero(mask)

@@ -13,7 +13,7 @@ def made_up_interval(mean, width):
     return {"mean": mean, "low": mean - width, "high": mean + width}
 
 
-def made_up_results(difference=(6.0, 2.0, 9.0)):
+def made_up_results(difference=(6.0, 2.0, 9.0), f1_hz=24e6, split="test"):
     rng = np.random.default_rng(0)
     shares = {name: rng.dirichlet((1, 1, 1)).tolist() for name in NAMES}
     shares |= {"always_2": [1.0, 0.0, 0.0], "always_4": [0.0, 1.0, 0.0]}
@@ -48,6 +48,7 @@ def made_up_results(difference=(6.0, 2.0, 9.0)):
             name: {family: rng.dirichlet((1, 1, 1)).tolist() for family in FAMILIES}
             for name in NAMES
         },
+        "config": {"env": {"sensor": {"f1_hz": f1_hz}}, "study": {"split": split}},
     }
 
 

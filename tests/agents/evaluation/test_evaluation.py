@@ -1,4 +1,7 @@
 import dataclasses
+import html
+import json
+import re
 
 import numpy as np
 import pytest
@@ -6,16 +9,14 @@ import pytest
 from agents.config.demo import DemoConfig
 from agents.config.study_config import StudyConfig
 from agents.evaluation.headroom import measure_problem
-from agents.evaluation.play import FIXED, Played, play_drives
+from agents.evaluation.play import FIXED_POLICIES, PlayedDrives, make_envs, play_drives
 from agents.evaluation.study import (
     evaluate_scheduler,
-    make_envs,
     play_all,
-    train_scheduler,
     tune_rule,
 )
 from agents.evaluation.summary import best_fixed, best_rival, difference, summary
-from agents.optimum.choices import threshold, tuned_rule
+from agents.optimum.choices import best_rule, threshold
 from agents.optimum.dynamic import clairvoyant
 from agents.optimum.outcome_table import play
 from agents.optimum.tabulation import tabulate
@@ -23,7 +24,10 @@ from agents.policies.fixed import FixedPolicy, RandomPolicy
 from agents.policies.guard import ThermalGuard
 from agents.policies.learned import PpoPolicy
 from agents.policies.rules import SnrThresholdPolicy
+from agents.report.evaluation_files import write_evaluation
+from agents.report.page import write_report
 from agents.report.strip import take_strip
+from agents.training.scheduler import train_scheduler
 from shotenv.config.env import RewardConfig
 from shotenv.config.reader import configs_dir, merged, read_config
 from shotenv.decision.features import FEATURE_NAMES
@@ -84,7 +88,7 @@ def test_a_drive_is_the_same_in_any_autoreset_mode(config):
         play_drives(RandomPolicy(3), make_envs(config.env, "test", 3, mode), SEEDS)
         for mode in ("Disabled", "SameStep")
     )
-    for field in dataclasses.fields(Played):
+    for field in dataclasses.fields(PlayedDrives):
         np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
 
 
@@ -101,7 +105,7 @@ def test_frames_without_laser_have_no_error_and_no_share(config):
 def made_up_played(rewards):
     shape = np.shape(rewards)
     ones = np.ones(shape)
-    return Played(
+    return PlayedDrives(
         seeds=np.arange(shape[0]),
         shots=np.full(shape, 4),
         reward=np.asarray(rewards, float),
@@ -117,7 +121,7 @@ def made_up_played(rewards):
 def test_summary_pairs_every_policy_with_the_best_fixed_choice():
     study = StudyConfig(bootstrap_draws=500)
     base = np.random.default_rng(0).normal(-1, 1, (6, 4))
-    played = {name: made_up_played(base - i) for i, name in enumerate(FIXED)}
+    played = {name: made_up_played(base - i) for i, name in enumerate(FIXED_POLICIES)}
     played["ppo"] = made_up_played(base + 0.5)
     results = summary(played, study, scheduler="ppo")
     assert results["best_fixed"] == best_fixed(played) == "always_2"
@@ -132,11 +136,11 @@ def test_summary_pairs_every_policy_with_the_best_fixed_choice():
     assert difference(played["ppo"], played["ppo"], study).value == 0.0
 
 
-def test_the_tuned_rule_is_the_best_on_the_drives_that_tuned_it(config):
+def test_the_best_rule_is_the_best_on_the_drives_that_tuned_it(config):
     rule = tune_rule(config)
     problem = open_problem(config.env.model_copy(update={"split": "validation"}))
     table = tabulate(problem, [1000, 1001]).table(config.env.reward)
-    best = tuned_rule(table)
+    best = best_rule(table)
     assert (rule.threshold, rule.below.action, rule.above.action) == best
     cost = play(table, threshold(*best)).cost.sum()
     for limit in (0.2, 0.5, 0.8):
@@ -168,17 +172,32 @@ def test_strip_shows_the_frames_that_were_played(config):
         assert np.median(error_m) < 0.5
 
 
-def test_train_and_evaluate_write_everything_the_report_needs(config, tmp_path):
-    from agents.report.page import write_report
+def text_of(page):
+    """What a reader sees of a page: its text, without scripts, styles and tags."""
+    bare = re.sub(r"<(script|style)>.*?</\1>", " ", page, flags=re.DOTALL)
+    return " ".join(html.unescape(re.sub(r"<[^>]*>", " ", bare)).split())
 
+
+def test_train_and_evaluate_write_everything_the_report_needs(config, tmp_path):
     scheduler = train_scheduler(config, tmp_path / "agent")
-    results = evaluate_scheduler(config, scheduler, tmp_path)
-    page = write_report(tmp_path).read_text()
-    assert "PPO scheduler" in page and str(results["drives"]) in page
-    written = {path.name for path in tmp_path.iterdir()}
-    assert written >= {"results.json", "drives.csv", "timeline.json", "frames.npz", "report.html"}
+    evaluation = evaluate_scheduler(config, scheduler)
+    assert {path.name for path in tmp_path.iterdir()} == {"agent"}, "judging writes nothing"
+    write_evaluation(evaluation, config, tmp_path)
+    shown = text_of(write_report(tmp_path).read_text())
+    assert "Every policy drove the same 3 drives of the test split" in shown
+    assert "over 3 test drives" in shown and "Wrapped map, 24 MHz" in shown
+    for policy in ("PPO scheduler", "SNR threshold rule", "Random", "Always 8 DCS, guarded"):
+        assert policy in shown
+    for name in ("snr_threshold", "cycle"):
+        assert evaluation.results["policies"][name]["rule"] in shown
+    assert {path.name for path in tmp_path.iterdir()} == {
+        *("agent", "results.json", "drives.csv", "timeline.json", "frames.npz", "report.html")
+    }
+    assert json.loads((tmp_path / "results.json").read_text()) == evaluation.results
+    rows = (tmp_path / "drives.csv").read_text().splitlines()
+    assert len(rows) == 1 + len(evaluation.played) * len(SEEDS)
     other = PpoPolicy(
         scheduler.network, scheduler.config, ThermalGuard(("heat_margin",), (0, 0, 0))
     )
     with pytest.raises(ValueError, match="other features"):
-        evaluate_scheduler(config, other, tmp_path)
+        evaluate_scheduler(config, other)

@@ -5,16 +5,16 @@ import numpy as np
 import pytest
 
 from agents.optimum.choices import (
+    always,
     best_choice,
     blind_choices,
     cycle,
-    fixed,
     mixture,
     threshold,
     threshold_choices,
 )
 from agents.optimum.dynamic import clairvoyant, greedy
-from agents.optimum.outcome_table import DriveTable, Laser, Situation, play
+from agents.optimum.outcome_table import DriveTable, Situation, ThermalState, play
 
 TRIP_K, RELEASE_K, AMBIENT_K, DECAY = 330.0, 325.0, 300.0, 0.7
 JUNCTION_DECAY = 0.4
@@ -22,7 +22,7 @@ JUNCTION_DECAY = 0.4
 
 def trip(case_k, rise_k, tripped):
     hot_k = case_k + rise_k
-    return Laser(case_k, rise_k, np.where(tripped, hot_k > RELEASE_K, hot_k >= TRIP_K))
+    return ThermalState(case_k, rise_k, np.where(tripped, hot_k > RELEASE_K, hot_k >= TRIP_K))
 
 
 def one_stage(laser, heat_j):
@@ -104,11 +104,11 @@ def test_the_surplus_is_paid_at_the_temperature_of_each_frame():
     extra = np.tile([0.0, 0.0, 2.0], (1, 1))
     table = draw_table(12, drives=1, frames=3, heat=(0, 0, 2), laser_cost=extra)
     dear = dataclasses.replace(table, surplus=warming(0.1))
-    laser, expected = table.start(), play(table, fixed(2)).cost[0]
+    laser, expected = table.start(), play(table, always(2)).cost[0]
     for _ in range(3):
         expected += 2.0 * 0.1 * (laser.temperature_k[0] - AMBIENT_K)
         laser = table.advance(laser, table.heat_j[:, 2])
-    assert play(dear, fixed(2)).cost[0] == pytest.approx(expected)
+    assert play(dear, always(2)).cost[0] == pytest.approx(expected)
 
 
 def test_a_look_ahead_pays_where_heat_matters():
@@ -133,7 +133,7 @@ def test_the_guard_never_trips_where_it_need_not():
 
 def test_a_tripped_laser_stays_off_until_it_has_cooled():
     table = draw_table(4, drives=1, frames=12, heat=(0.0, 0.0, 25.0))
-    played = play(table, fixed(2))
+    played = play(table, always(2))
     off = played.actions[0] < 0
     assert off.any() and not off.all()
     expected = np.where(off, 3.0, table.cost[0, :, 2]).sum()

@@ -5,8 +5,7 @@ import pytest
 import torch
 from test_training import CONFIG, FRAMES, OPEN, make_envs, validate
 
-from agents.evaluation.play import play_drives
-from agents.evaluation.study import make_envs as make_shotenv
+from agents.evaluation.play import make_envs as make_shotenv, play_drives
 from agents.policies.fixed import FixedPolicy
 from agents.policies.guard import ThermalGuard
 from agents.policies.learned import PpoPolicy, build_network

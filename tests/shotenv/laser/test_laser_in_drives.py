@@ -9,8 +9,7 @@ import pytest
 import torch
 
 from agents.evaluation.headroom import check_solvable
-from agents.evaluation.play import play_drives
-from agents.evaluation.study import make_envs
+from agents.evaluation.play import make_envs, play_drives
 from agents.optimum.dynamic import clairvoyant, greedy
 from agents.optimum.outcome_table import play
 from agents.optimum.tabulation import tabulate
