@@ -19,11 +19,6 @@ class Interval:
     low: float
     high: float
 
-    @property
-    def excludes_zero(self) -> bool:
-        """Whether the whole interval lies on one side of zero."""
-        return self.low > 0.0 or self.high < 0.0
-
     def named(self, name: str) -> dict[str, float]:
         """As plain numbers, the point estimate under `name`."""
         numbers = asdict(self)

@@ -19,14 +19,9 @@ class Shots(enum.IntEnum):
     FOUR = 4
     EIGHT = 8
 
-    @classmethod
-    def from_action(cls, action: int) -> Shots:
-        """Shots of an environment action: 0 = 2 DCS, 1 = 4 DCS, 2 = 8 DCS."""
-        return tuple(cls)[action]
-
     @property
     def action(self) -> int:
-        """Environment action that asks for these shots."""
+        """Environment action that asks for these shots: 0 = 2 DCS, 1 = 4 DCS, 2 = 8 DCS."""
         return tuple(type(self)).index(self)
 
 

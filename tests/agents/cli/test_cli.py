@@ -1,11 +1,18 @@
 import json
+import re
+from dataclasses import replace
 
 import pytest
+import torch
 from report_sample import made_up_results, made_up_strip, made_up_timeline
+from safetensors.torch import load_file
 
 from agents.cli.doctor import Finding
 from agents.cli.entry import COMMANDS, main
+from agents.evaluation.play import play_drives
+from agents.policies.learned import PpoPolicy
 from agents.report.results import FRAMES, RESULTS, TIMELINE, write_strip
+from agents.training.ppo import CHECKPOINT
 from shotenv.config.families import FAMILIES
 from unwrap.support.files import write_json
 
@@ -24,8 +31,8 @@ def tiny(tiny_bank, tiny_unwrapper):
 def test_overview_lists_every_command(capsys):
     status, out, _ = run(capsys, "--help")
     assert status == 0
-    for command in COMMANDS:
-        assert command.words in out
+    told = re.findall(r"^  (\S.*?)  +(\S.*)$", out, flags=re.MULTILINE)
+    assert told == [(command.words, command.help) for command in COMMANDS]
     assert run(capsys)[0] == 2
 
 
@@ -33,7 +40,52 @@ def test_overview_lists_every_command(capsys):
 def test_every_command_explains_itself(capsys, command):
     status, out, _ = run(capsys, *command.words.split(), "--help")
     assert status == 0 and f"shotenv {command.words}" in out
-    assert callable(command.action)
+
+
+RESUMING = {"demo", "train", "render", "unwrap train", "unwrap table"}
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.words)
+def test_ctrl_c_says_what_the_same_command_will_do(capsys, monkeypatch, command):
+    def interrupted(arguments):
+        raise KeyboardInterrupt
+
+    alone = replace(command, arguments=lambda parser: None, action=interrupted)
+    monkeypatch.setattr("agents.cli.entry.COMMANDS", (alone,))
+    status, out, err = run(capsys, *command.words.split())
+    resumes = command.words in RESUMING
+    says = "continues where it stopped" if resumes else "starts over"
+    assert (status, out, err) == (130, "", f"shotenv: interrupted; the same command {says}\n")
+
+
+def test_ctrl_c_before_a_command_has_begun_promises_nothing(capsys, monkeypatch):
+    def interrupted(words):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("agents.cli.entry._run", interrupted)
+    assert run(capsys, "demo") == (130, "", "shotenv: interrupted\n")
+
+
+def test_an_interrupted_training_of_the_command_line_goes_on(capsys, monkeypatch, tmp_path, tiny):
+    small = "--agent.total_steps 96 --agent.num_envs 2 --agent.rollout_steps 16"
+    small += " --agent.batch_size 16 --env.frames_per_drive 16 --study.tuning_drives 2"
+    words = ("train", *small.split(), *tiny)
+    played, judged = play_drives, []
+
+    def interrupting(policy, *rest, **options):
+        judged.append(policy)
+        if isinstance(policy, PpoPolicy) and sum(isinstance(p, PpoPolicy) for p in judged) == 3:
+            raise KeyboardInterrupt
+        return played(policy, *rest, **options)
+
+    with monkeypatch.context() as patched:
+        patched.setattr("agents.training.scheduler.play_drives", interrupting)
+        status, _, err = run(capsys, *words, "--out", tmp_path / "parts")
+    assert status == 130 and err.endswith("continues where it stopped\n")
+    for name in ("parts", "whole"):
+        assert run(capsys, *words, "--out", tmp_path / name)[0] == 0
+    one, two = (load_file(tmp_path / name / CHECKPOINT) for name in ("parts", "whole"))
+    assert one.keys() == two.keys() and all(torch.equal(one[key], two[key]) for key in one)
 
 
 def test_a_group_lists_its_commands(capsys):
@@ -141,6 +193,11 @@ def test_problem_writes_its_numbers(capsys, tmp_path, tiny):
     path = tmp_path / "problem.json"
     status, out, _ = run(capsys, "problem", *words, "--json", path, *tiny)
     assert status == 0 and "Clairvoyant optimum over 2 test drives" in out
+    bank, unwrapper = tiny[1], tiny[3]
+    measured = f"bank {bank}, unwrapper {unwrapper}, laser vcsel"
+    held = "holds" if json.loads(path.read_text())["holds"] else "DOES NOT hold"
+    assert out.startswith(f"{measured}; reward: error 1, ")
+    assert out.endswith(f"This problem ({measured}) {held} every goal.\n")
     shares = json.loads(path.read_text())["optimum"]["shots_share"]
     assert sum(share["mean"] for share in shares.values()) == pytest.approx(1.0)
 

@@ -42,6 +42,15 @@ def test_cycle_starts_with_its_special_frame_and_starts_anew():
     np.testing.assert_array_equal(policy.act(BATCH), np.full(5, 2))
 
 
+def test_rules_say_what_they_do():
+    assert str(CyclePolicy(4, shots=8, otherwise=2)) == "8 DCS every 4th frame, else 2"
+    assert str(CyclePolicy(2, shots=4, otherwise=2)) == "4 DCS every 2nd frame, else 2"
+    said = {period: str(CyclePolicy(period)).split()[3] for period in (3, 11, 12, 13, 21, 22, 113)}
+    assert list(said.values()) == ["3rd", "11th", "12th", "13th", "21st", "22nd", "113th"]
+    rule = SnrThresholdPolicy(NAMES, 0.25, below=8, above=4)
+    assert str(rule) == "8 DCS where signal_to_noise < 0.250, else 4"
+
+
 def test_threshold_compares_the_named_feature():
     policy = SnrThresholdPolicy(NAMES, 0.25, below=8, above=2)
     observation = np.array([[9, 0.2, 9], [-9, 0.25, -9], [0, 0.3, 0]], np.float32)
@@ -55,7 +64,9 @@ def test_saved_scheduler_decides_the_same(tmp_path: Path):
     policy.save(tmp_path / "agent")
     loaded = PpoPolicy.load(tmp_path / "agent")
     observation = np.random.default_rng(0).normal(size=(64, 3)).astype(np.float32) * 10
-    np.testing.assert_array_equal(policy.act(observation), loaded.act(observation))
+    chosen = policy.act(observation)
+    assert len(np.unique(chosen)) > 1, "else any network would do"
+    np.testing.assert_array_equal(chosen, loaded.act(observation))
     assert loaded.config == config and loaded.feature_names == GUARD.feature_names
     assert isinstance(loaded.act(observation[0]), int)
 
@@ -83,3 +94,38 @@ def test_missing_and_damaged_schedulers_are_named(tmp_path: Path):
     (tmp_path / "agent.json").write_text("{")
     with pytest.raises(ValueError, match="damaged"):
         PpoPolicy.load(tmp_path)
+
+
+def without(content, key):
+    return {name: value for name, value in content.items() if name != key}
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda saved: without(saved, "schema"), "is damaged; expected the description"),
+        (lambda saved: [saved], "is damaged; expected the description"),
+        (lambda saved: saved | {"schema": 2}, "schema 2, but this version reads 3; train the"),
+        (lambda saved: without(saved, "agent"), "agent: field required; expected what `shotenv"),
+        (lambda saved: without(saved, "feature_names"), "feature_names: field required"),
+        (lambda saved: saved | {"mood": 1}, "mood: extra inputs are not permitted, got 1; exp"),
+        (
+            lambda saved: saved | {"agent": saved["agent"] | {"algorithm": "ppo"}},
+            "agent.algorithm: extra inputs are not permitted, got 'ppo'; expected",
+        ),
+        (
+            lambda saved: saved | {"agent": saved["agent"] | {"gamma": 3}},
+            "agent.gamma: input should be less than or equal to 1, got 3; expected",
+        ),
+        (lambda saved: saved | {"guard_needed_k": [0, 1]}, "guard_needed_k.2: field required"),
+        (lambda saved: saved | {"feature_names": list(NAMES)}, "feature_names: .*'heat_margin'"),
+    ],
+)
+def test_a_description_that_cannot_be_used_names_file_and_field(tmp_path, change, says):
+    config = AgentConfig(hidden=(8,))
+    PpoPolicy(build_network(3, config), config, GUARD).save(tmp_path)
+    path = tmp_path / "agent.json"
+    path.write_text(json.dumps(change(json.loads(path.read_text()))))
+    with pytest.raises(ValueError, match=rf"agent\.json.*{says}") as caught:
+        PpoPolicy.load(tmp_path)
+    assert type(caught.value) is ValueError and str(caught.value).startswith(str(path))

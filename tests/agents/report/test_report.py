@@ -10,6 +10,7 @@ from agents.report.results import (
     FRAMES,
     RESULTS,
     TIMELINE,
+    label,
     read_strip,
     rival_note,
     verdict,
@@ -67,12 +68,15 @@ def test_strongest_rival_is_named_with_its_interval():
 def test_page_is_self_contained(page):
     without_plotly = re.sub(r"<script>.*?</script>", "", page, count=1, flags=re.DOTALL)
     assert not re.search(r"(src|href)\s*=\s*[\"'](https?:)?//", without_plotly)
-    assert "Plotly" in page and "cdn.plot.ly" not in without_plotly
+    library, *calls = re.findall(r"<script[^>]*>(.*?)</script>", page, flags=re.DOTALL)
+    assert len(library) > 10**6 and "plotly.js" in library[:200]
+    assert sum("Plotly.newPlot" in call for call in calls) == 3
 
 
 def test_page_shows_every_policy_and_family(page):
-    for name in ("PPO scheduler", "SNR threshold rule", "Random", "Always 2 DCS", "Always 8 DCS"):
-        assert name in page
+    table = re.search(r"<tbody>.*?</tbody>", page, flags=re.DOTALL).group()
+    named = re.findall(r"<tr[^>]*>\s*<td>([^<]*)", table)
+    assert sorted(named) == sorted(label(name) for name in made_up_results()["policies"])
     for family in FAMILIES:
         assert f'data-family="{family}"' in page
     assert verdict(made_up_results()) in page and rival_note(made_up_results()) in page
@@ -86,6 +90,16 @@ def test_page_holds_five_pictures_of_each_frame(page):
     for frame in frames:
         assert set(frame["images"]) == {"gray", "wrapped", "corrected", "truth", "error"}
         assert decoded(frame["images"]["truth"]).shape == (24, 32, 3)
+
+
+def test_texts_follow_the_configuration():
+    page = render_page(made_up_results(), made_up_timeline(), made_up_strip())
+    other = made_up_results(f1_hz=10e6, split="shift")
+    changed = render_page(other, made_up_timeline(), made_up_strip())
+    assert "<figcaption>Wrapped map, 24 MHz</figcaption>" in page
+    assert "<figcaption>Wrapped map, 10 MHz</figcaption>" in changed and "24 MHz" not in changed
+    assert "over 24 test drives" in page and "the same 24 drives of the test split" in page
+    assert "over 24 shift drives" in changed and "the same 24 drives of the shift split" in changed
 
 
 def test_names_are_escaped():

@@ -18,10 +18,9 @@ CLOSED = ThermalGuard(FEATURE_NAMES, (1e3, 1e3, 1e3))
 
 @pytest.fixture
 def make(tiny_kwargs):
-    def make(adapter, guard=OPEN):
-        envs = ShotScheduleVectorEnv(
-            DRIVES, autoreset_mode="SameStep", remember=True, **{**tiny_kwargs, "split": "all"}
-        )
+    def make(adapter, guard=OPEN, **changes):
+        kwargs = {**tiny_kwargs, "split": "all", **changes}
+        envs = ShotScheduleVectorEnv(DRIVES, autoreset_mode="SameStep", remember=True, **kwargs)
         adapted = PairedVecEnv(envs, guard) if adapter is PairedVecEnv else adapter(envs)
         adapted.seed_all(range(DRIVES))
         adapted.reset()
@@ -50,9 +49,12 @@ def test_differences_between_choices_are_those_of_the_true_reward(make):
     np.testing.assert_allclose((paired[0] - paired[1])[kept], true[kept], atol=1e-5)
 
 
-def test_reward_has_a_floor(make):
-    rewards = play(make(PairedVecEnv), np.full((6, DRIVES), 2))
-    assert rewards.min() >= LOWEST
+def test_a_trip_costs_the_floor_in_place_of_many_times_that(make):
+    hot = {"laser": {"thermal_resistance_k_per_w": 200.0, "thermal_time_constant_s": 1.0}}
+    actions = np.full((12, DRIVES), 2)
+    true, rewards = (play(make(kind, **hot), actions) for kind in (Sb3VecEnv, PairedVecEnv))
+    assert true.min() < 2 * LOWEST, "nothing tripped"
+    assert rewards.min() == np.float32(LOWEST)
 
 
 def test_guard_stands_between_learner_and_laser(make):

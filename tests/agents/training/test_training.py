@@ -1,3 +1,7 @@
+import ast
+import re
+from pathlib import Path
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -5,12 +9,14 @@ import torch
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from safetensors.torch import load_file
 
+import agents
 from agents.config.agent import AgentConfig
 from agents.policies.guard import ThermalGuard
 from agents.policies.learned import PpoPolicy
 from agents.training.ppo import CHECKPOINT, Trainer
 from agents.training.sb3_vector import Sb3VecEnv, split_infos
 
+AGENTS = Path(agents.__file__).parent
 FRAMES = 16
 OPEN = ThermalGuard(("signal", "heat_margin"), (-1e3, -1e3, -1e3))
 """A guard that lets everything pass."""
@@ -69,6 +75,29 @@ def test_adapter_reports_the_end_of_an_episode_as_sb3_expects():
     envs.seed_all([1, 2, 3, 4])
     np.testing.assert_array_equal(envs.reset(), first)
     assert (envs.reset() != first).any(), "seeds count once"
+
+
+def test_adapter_seeds_its_environments_in_turn():
+    envs, others = Sb3VecEnv(make_envs()), Sb3VecEnv(make_envs())
+    envs.seed(7)
+    others.seed_all([7, 8, 9, 10])
+    np.testing.assert_array_equal(envs.reset(), others.reset())
+    assert len(envs.get_attr("num_envs")) == 4
+    assert (
+        envs.get_attr("num_envs", 2) == [4] and len(envs.env_is_wrapped(gym.Wrapper, [0, 3])) == 2
+    )
+
+
+def test_nothing_reaches_into_private_parts_of_others():
+    """An attribute `_name` belongs to the object that has it: only `self` and `cls` use it."""
+    reached = [
+        f"{path.relative_to(AGENTS)}:{node.lineno} {ast.unparse(node)}"
+        for path in AGENTS.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Attribute) and re.match(r"_[^_]", node.attr)
+        if not (isinstance(node.value, ast.Name) and node.value.id in ("self", "cls"))
+    ]
+    assert reached == []
 
 
 def test_adapter_refuses_other_autoreset_modes():
