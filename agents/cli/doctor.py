@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 import shutil
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 
 NEEDED_BYTES = 2 * 10**9
 OLDEST_PYTHON = (3, 11)
+OTHERS = ("all", "dev", "docs", "export", "fast", "verify")
+"""Extras that the main job does without."""
 
 
 @dataclass(frozen=True)
@@ -31,65 +33,60 @@ class Finding:
 
 def examine() -> tuple[Finding, ...]:
     """Look at everything that the main job needs; stops at packages where one is missing."""
-    installed = (*_python(), *_packages())
+    installed = (python_itself(), *packages())
     if not all(finding.well for finding in installed):
+        # What follows imports them.
         return installed
-    return (*installed, *_torch(), *_llvm(), *_cache(), *_weights())
+    return (*installed, torch_build(), llvm(), cache_folder(), *shipped_networks())
 
 
-def _python() -> tuple[Finding, ...]:
+def python_itself() -> Finding:
+    """Whether this Python is new enough."""
     well = sys.version_info[:2] >= OLDEST_PYTHON
     detail = f"{platform.python_version()} at {sys.executable}"
-    return (Finding("python", well, detail, "apt-get install python3.11"),)
+    return Finding("python", well, detail, "apt-get install python3.11")
 
 
-def _packages() -> tuple[Finding, ...]:
+def packages() -> tuple[Finding, ...]:
     """Every package that the main job imports, with its version."""
-    names = sorted({_name_of(line) for line in requires("shotenv") or () if _is_for_main_job(line)})
-    return tuple(_package(name) for name in names if name != "shotenv")
+    other = re.compile(rf"""extra == ['"]({"|".join(OTHERS)})['"]""")
+    # A requirement reads `numba>=0.60; extra == "sim"`: name, versions, and what it is for.
+    needed = [line for line in requires("shotenv") or () if not other.search(line)]
+    names = {re.split(r"[;\[<>=!~ ]", line)[0] for line in needed}
+    found = []
+    for name in sorted(names - {"shotenv"}):
+        try:
+            found.append(Finding(name, True, version(name)))
+        except PackageNotFoundError:
+            found.append(Finding(name, False, "not installed", "pip install 'shotenv[all]'"))
+    return tuple(found)
 
 
-def _is_for_main_job(requirement: str) -> bool:
-    return not any(f"extra == {quote}{e}{quote}" in requirement for quote in "'\"" for e in OTHERS)
-
-
-OTHERS = ("all", "dev", "docs", "export", "fast", "verify")
-"""Extras that the main job does without."""
-
-
-def _name_of(requirement: str) -> str:
-    return requirement.split(";")[0].split("[")[0].split("<")[0].split(">")[0].split("=")[0].strip()
-
-
-def _package(name: str) -> Finding:
-    try:
-        return Finding(name, True, version(name))
-    except PackageNotFoundError:
-        return Finding(name, False, "not installed", "pip install 'shotenv[all]'")
-
-
-def _torch() -> tuple[Finding, ...]:
+def torch_build() -> Finding:
+    """Which torch, and how much of the machine it may use."""
     import torch
 
     device = "CUDA" if torch.cuda.is_available() else "CPU"
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     detail = f"{device} build, {torch.get_num_threads()} threads on {cores} cores"
-    return (Finding("torch build", True, detail),)
+    return Finding("torch build", True, detail)
 
 
-def _llvm() -> tuple[Finding, ...]:
+def llvm() -> Finding:
+    """Whether the renderer finds the library that it compiles with."""
     from shotenv.render.backend import CURE, OLDEST_LLVM, find_llvm
 
     cure = CURE.removeprefix("install one with: ")
     found = find_llvm()
     if found is None:
-        return (Finding("LLVM", False, "no library found", cure),)
+        return Finding("LLVM", False, "no library found", cure)
     path, major = found
     detail = f"version {major} at {path}" if major else f"{path} is no LLVM library"
-    return (Finding("LLVM", major >= OLDEST_LLVM, detail, cure),)
+    return Finding("LLVM", major >= OLDEST_LLVM, detail, cure)
 
 
-def _cache() -> tuple[Finding, ...]:
+def cache_folder() -> Finding:
+    """Whether there is room for a bank."""
     from shotenv.bank import cache_dir
 
     folder = cache_dir()
@@ -98,19 +95,21 @@ def _cache() -> tuple[Finding, ...]:
     writable = os.access(existing, os.W_OK)
     detail = f"{folder}, {free / 1e9:.1f} GB free{'' if writable else ', not writable'}"
     cure = "export SHOTENV_CACHE=/a/folder/with/2/GB"
-    return (Finding("cache folder", writable and free >= NEEDED_BYTES, detail, cure),)
+    return Finding("cache folder", writable and free >= NEEDED_BYTES, detail, cure)
 
 
-def _weights() -> tuple[Finding, ...]:
+def shipped_networks() -> tuple[Finding, ...]:
+    """Whether the weights of the unwrapping networks can be read."""
     from unwrap.networks import load_unwrapper
 
-    return tuple(_network(name, load_unwrapper) for name in ("tofregnet", "tofsegnet"))
-
-
-def _network(name: str, load: Callable) -> Finding:
-    try:
-        unwrapper = load(name)
-    except ValueError as error:
-        return Finding(name, False, str(error), f"shotenv unwrap train --network {name}")
-    width = unwrapper.metadata["width"]
-    return Finding(name, True, f"width {width}, sha256 {unwrapper.fingerprint[:12]}")
+    found = []
+    for name in ("tofregnet", "tofsegnet"):
+        try:
+            unwrapper = load_unwrapper(name)
+        except ValueError as error:
+            cure = f"shotenv unwrap train --network {name}"
+            found.append(Finding(name, False, str(error), cure))
+        else:
+            detail = f"width {unwrapper.metadata['width']}, sha256 {unwrapper.fingerprint[:12]}"
+            found.append(Finding(name, True, detail))
+    return tuple(found)

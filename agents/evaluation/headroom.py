@@ -118,6 +118,7 @@ def _rivals(validation: DriveTable, table: DriveTable) -> dict[str, tuple[str, P
     fixed = {f"always {shots}": always(shots.action) for shots in Shots}
     best_fixed, best_blind = best_choice(table, fixed.items()), best_choice(table, blind.items())
     rule = best_rule(validation)
+    # Of the two that look at nothing but the frame the better one counts.
     short_sighted = {
         "least cost of the frame": greedy(table, guarded=False),
         "least cost of the frame that does not trip": greedy(table, guarded=True),

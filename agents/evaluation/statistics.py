@@ -68,9 +68,18 @@ def interval(
     Efron, *Better bootstrap confidence intervals*, J. Am. Stat. Assoc. 82 (1987). Where the
     statistic does not depend on which drives are drawn, the interval is the point itself.
     """
-    arrays = _checked(samples)
+    arrays = tuple(np.asarray(sample, dtype=np.float64) for sample in samples)
+    shapes = [array.shape for array in arrays]
+    if len(set(shapes)) != 1 or arrays[0].ndim != 1 or arrays[0].size < 2:
+        raise ValueError(f"samples have shapes {shapes}; expected equal [N] with N >= 2 drives")
+    if not all(np.isfinite(array).all() for array in arrays):
+        raise ValueError("samples hold a value that is not finite; expected one number per drive")
     point = float(statistic(*arrays, axis=-1))
-    if np.allclose(_leave_one_out(statistic, arrays), point, rtol=1e-12, atol=1e-15):
+    # BCa divides by the spread over samples with one drive left out; it is 0 where a policy does
+    # the same in every drive, as always 2 DCS does in its share of shots.
+    kept = ~np.eye(arrays[0].size, dtype=bool)
+    one_left_out = [float(statistic(*(array[row] for array in arrays), axis=-1)) for row in kept]
+    if np.allclose(one_left_out, point, rtol=1e-12, atol=1e-15):
         return Interval(point, point, point)
     result = bootstrap(
         arrays,
@@ -84,18 +93,3 @@ def interval(
         rng=np.random.default_rng(seed),
     ).confidence_interval
     return Interval(point, float(result.low), float(result.high))
-
-
-def _checked(samples: Sequence[Sequence[float] | np.ndarray]) -> tuple[np.ndarray, ...]:
-    arrays = tuple(np.asarray(sample, dtype=np.float64) for sample in samples)
-    lengths = [array.shape for array in arrays]
-    if len(set(lengths)) != 1 or arrays[0].ndim != 1 or arrays[0].size < 2:
-        raise ValueError(f"samples have shapes {lengths}; expected equal [N] with N >= 2 drives")
-    if not all(np.isfinite(array).all() for array in arrays):
-        raise ValueError("samples hold a value that is not finite; expected one number per drive")
-    return arrays
-
-
-def _leave_one_out(statistic: Statistic, arrays: tuple[np.ndarray, ...]) -> np.ndarray:
-    kept = ~np.eye(arrays[0].size, dtype=bool)
-    return np.array([float(statistic(*(a[row] for a in arrays), axis=-1)) for row in kept])

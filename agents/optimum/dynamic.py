@@ -30,7 +30,12 @@ def clairvoyant(table: DriveTable, *, levels: int = 801, rise_levels: int = 25) 
     `levels` temperatures of the case; with a junction stage a quarter of them, times `rise_levels`
     rises of the junction.
     """
-    grid = _grid(table, levels, rise_levels)
+    # Without a junction stage there is one rise, 0, and the case has all the levels to itself.
+    stages = bool(table.highest_rise_k)
+    grid = _Grid(
+        np.linspace(*table.span_k, levels // 4 if stages else levels),
+        np.linspace(0.0, table.highest_rise_k, rise_levels) if stages else np.zeros(1),
+    )
     values = _values_to_go(table, grid)
 
     def choose(now: Situation) -> np.ndarray:
@@ -46,6 +51,7 @@ def greedy(table: DriveTable, *, guarded: bool) -> PlayedTable:
 
     def choose(now: Situation) -> np.ndarray:
         trips = table.consequences(now.laser).tripped
+        # Where every action trips none is barred: one has to be taken.
         barred = trips & ~trips.all(axis=-1, keepdims=True) & guarded
         return np.argmin(np.where(barred, np.inf, now.cost), axis=-1)
 
@@ -69,19 +75,13 @@ class _Grid(NamedTuple):
         )
 
 
-def _grid(table: DriveTable, levels: int, rise_levels: int) -> _Grid:
-    if not table.highest_rise_k:
-        return _Grid(np.linspace(*table.span_k, levels), np.zeros(1))
-    rises_k = np.linspace(0.0, table.highest_rise_k, rise_levels)
-    return _Grid(np.linspace(*table.span_k, levels // 4), rises_k)
-
-
 def _values_to_go(table: DriveTable, grid: _Grid) -> np.ndarray:
     """Least cost from each frame on, [T + 1, 2 (tripped), N, case levels, rise levels]."""
     drives, frames, _ = table.cost.shape
     shape = drives, grid.case_k.size, grid.rise_k.size
     values = np.zeros((frames + 1, 2, *shape))
     on, off = (grid.everywhere(drives, tripped=tripped) for tripped in (False, True))
+    # Where a grid point ends up one frame later does not depend on the frame: found once.
     warmed = _corners(grid, table.consequences(on))
     cooled = _corners(grid, table.advance(off, np.zeros(off.case_k.shape)))
     for frame in reversed(range(frames)):
@@ -106,6 +106,7 @@ def _corners(grid: _Grid, laser: ThermalState) -> _Corners:
     """The grid points that a value is interpolated from."""
     case_k, rise_k, tripped = np.broadcast_arrays(*laser)
     drive = np.arange(len(case_k)).reshape(-1, *[1] * (case_k.ndim - 1))
+    # Indices into the flattened values [2 (tripped), N, case levels, rise levels].
     row = (tripped * len(case_k) + drive) * grid.case_k.size
     stored, weight = zip(
         *(

@@ -157,6 +157,7 @@ def play(table: DriveTable, choose: Choice) -> PlayedTable:
     for frame in range(frames):
         now = Situation(frame, laser, snr, table)
         chosen = choose(now)
+        # A tripped laser takes no samples: nothing is told, nothing warms, the action is void.
         actions[:, frame] = np.where(laser.tripped, -1, chosen)
         cost += np.where(laser.tripped, table.tripped_cost[:, frame], now.cost[rows, chosen])
         snr = np.where(laser.tripped, snr, table.snr[rows, frame, chosen])

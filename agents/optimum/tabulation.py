@@ -54,9 +54,13 @@ class Possible:
         heat_j = self._stacked(lambda one: one.heat_j[0])
         cost = self._stacked(lambda one: -reward(one.terms, weights))
         off = self._stacked(lambda one: -reward(one.tripped_terms, weights))
+        # At 25 C the laser turns `efficiency` of its energy into light and the rest into heat; its
+        # price is relative to the energy of always 8 DCS.
+        laser_j = heat_j / (1.0 - laser.efficiency)
+        whole_j = np.array([float(drive.always_eight.energy_j) for drive in self.drives])
         return DriveTable(
             cost=cost,
-            laser_cost=self._laser_cost(heat_j, weights),
+            laser_cost=weights.power * laser_j / whole_j[:, None],
             surplus=lambda temperature_k: energy_surplus(temperature_k, laser),
             tripped_cost=np.broadcast_to(off.reshape(-1, 1), cost.shape[:2]),
             heat_j=heat_j,
@@ -66,12 +70,6 @@ class Possible:
             highest_rise_k=laser.junction_resistance_k_per_w * _hottest_j(heat_j, laser) / period_s,
             advance=thermal_model(ambient_k, laser, period_s),
         )
-
-    def _laser_cost(self, heat_j: np.ndarray, weights: RewardConfig) -> np.ndarray:
-        """What the laser's own energy at 25 C costs with each action, [N, A]."""
-        laser_j = heat_j / (1.0 - self.problem.config.laser.efficiency)
-        whole_j = np.array([float(drive.always_eight.energy_j) for drive in self.drives])
-        return weights.power * laser_j / whole_j[:, None]
 
     def _stacked(self, of: Callable[[Outcomes], Tensor]) -> np.ndarray:
         return np.stack([of(one).numpy().astype(np.float64) for one in self.outcomes])

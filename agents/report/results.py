@@ -90,9 +90,12 @@ def verdict(results: dict[str, Any]) -> str:
             "includes zero."
         )
     beats = "beats" if pair["difference"] > 0 else "does worse than"
+    used_j = [results["policies"][name]["laser_energy_j"]["mean"] for name in (scheduler, fixed)]
+    change = used_j[0] / used_j[1] - 1.0
+    energy = f"{abs(change):.0%} {'less' if change < 0 else 'more'} laser energy"
     return (
         f"The trained scheduler {beats} {against}, by {abs(pair['difference']):.1f} in return "
-        f"({interval}) {drives}, with {_energy_change(results, scheduler, fixed)}."
+        f"({interval}) {drives}, with {energy}."
     )
 
 
@@ -109,12 +112,6 @@ def rival_note(results: dict[str, Any]) -> str:
 
 def _in_a_sentence(name: str) -> str:
     return label(name).lower().replace("dcs", "DCS").replace("snr", "SNR")
-
-
-def _energy_change(results: dict[str, Any], scheduler: str, fixed: str) -> str:
-    used = [results["policies"][name]["laser_energy_j"]["mean"] for name in (scheduler, fixed)]
-    change = used[0] / used[1] - 1.0
-    return f"{abs(change):.0%} {'less' if change < 0 else 'more'} laser energy"
 
 
 def write_drives(path: Path, rows: Sequence[dict[str, Any]]) -> None:

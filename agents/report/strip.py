@@ -11,7 +11,7 @@ from torch import Tensor
 from agents.evaluation import PlayedDrives
 from agents.optimum import drive_of
 from agents.report.results import Strip
-from shotenv.decision import Drive, Problem, acquire_depth
+from shotenv.decision import Problem, acquire_depth
 from shotenv.laser import emitted_power_w
 from unwrap.signal import Shots, unambiguous_range_m
 
@@ -20,18 +20,24 @@ FRAMES_PER_FAMILY = 8
 
 def take_strip(problem: Problem, played: PlayedDrives) -> Strip:
     """A run of frames of each scene family in `played`, taken again with the same noise."""
-    chosen = list(_runs(played))
-    drives = {i: drive_of(problem, int(played.seeds[i])) for i, _ in chosen}
-    images = [
-        _images(
-            problem,
-            drives[i],
-            frame,
-            int(played.shots[i, frame]),
-            _power_w(problem, drives[i], played, i, frame),
+    chosen = list(runs_to_show(played))
+    drives = {row: drive_of(problem, int(played.seeds[row])) for row, _ in chosen}
+    images = []
+    for row, frame in chosen:
+        drive, step = drives[row], torch.tensor([frame])
+        # A derated laser's power follows its temperature before the frame.
+        before_k = torch.tensor(played.temperature_k[[row], frame - 1]) if frame else drive.start_k
+        power_w = emitted_power_w(drive.laser_power_w, before_k, problem.config.laser)
+        made = acquire_depth(problem, drive, step, Shots(int(played.shots[row, frame])), power_w)
+        images.append(
+            {
+                "gray_lsb": problem.bank.gray(drive.frame(step))[0].numpy(),
+                "wrapped_m": _half(made.depth.wrapped_m[0]),
+                "corrected_m": _half(made.depth.distance_m[0]),
+                "truth_m": _half(made.truth_m[0]),
+                "valid": made.depth.valid[0].numpy(),
+            }
         )
-        for i, frame in chosen
-    ]
     where = tuple(np.array(chosen).T)
     return Strip(
         **{name: np.stack([one[name] for one in images]) for name in images[0]},
@@ -45,45 +51,20 @@ def take_strip(problem: Problem, played: PlayedDrives) -> Strip:
     )
 
 
-def _runs(played: PlayedDrives) -> Iterator[tuple[int, int]]:
-    """(drive, frame) of some consecutive frames of each family: a run with many choices of shots.
+def runs_to_show(played: PlayedDrives) -> Iterator[tuple[int, int]]:
+    """(drive, frame) of up to `FRAMES_PER_FAMILY` consecutive frames of each family.
 
-    A run in which the scheduler changes its mind shows more than one in which it does not.
+    The longest run is taken, and among those the one with most different shots: a run in which the
+    scheduler changes its mind shows more than one in which it does not.
     """
     for family in np.unique(played.family).tolist():
-        starts = np.argwhere(played.family == family)
-        runs = [_run(played, int(i), int(frame), family) for i, frame in starts]
+        shown = (played.family == family) & (played.shots > 0)
+        runs = []
+        for drive, start in np.argwhere(played.family == family).tolist():
+            ahead = shown[drive, start : start + FRAMES_PER_FAMILY]
+            length = len(ahead) if ahead.all() else int(np.argmin(ahead))  # to the first False
+            runs.append([(drive, frame) for frame in range(start, start + length)])
         yield from max(runs, key=lambda run: (len(run), len({played.shots[at] for at in run})))
-
-
-def _run(played: PlayedDrives, drive: int, start: int, family: str) -> list[tuple[int, int]]:
-    end = start
-    while end < min(start + FRAMES_PER_FAMILY, played.shots.shape[1]):
-        if played.family[drive, end] != family or played.shots[drive, end] == 0:
-            break
-        end += 1
-    return [(drive, frame) for frame in range(start, end)]
-
-
-def _power_w(problem: Problem, drive: Drive, played: PlayedDrives, row: int, frame: int) -> Tensor:
-    """The laser's power in a frame, after derating."""
-    told_k = torch.tensor(played.temperature_k[[row], max(frame - 1, 0)])
-    start_k = told_k if frame else drive.start_k
-    return emitted_power_w(drive.laser_power_w, start_k, problem.config.laser)
-
-
-def _images(
-    problem: Problem, drive: Drive, frame: int, shots: int, power_w: Tensor
-) -> dict[str, np.ndarray]:
-    step = torch.tensor([frame])
-    made = acquire_depth(problem, drive, step, Shots(shots), power_w)
-    return {
-        "gray_lsb": problem.bank.gray(drive.frame(step))[0].numpy(),
-        "wrapped_m": _half(made.depth.wrapped_m[0]),
-        "corrected_m": _half(made.depth.distance_m[0]),
-        "truth_m": _half(made.truth_m[0]),
-        "valid": made.depth.valid[0].numpy(),
-    }
 
 
 def _half(image: Tensor) -> np.ndarray:

@@ -47,6 +47,7 @@ class PairedVecEnv(Sb3VecEnv):
 
     def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Step all environments with the kept actions."""
+        # Before the step, which goes on to the next frame.
         usual = self._native.problem.config.reward.error * self._native.error_of(Shots.FOUR)
         observations, rewards, dones, infos = super().step_wait()
         self._observed = observations

@@ -210,7 +210,7 @@ class _Ticks(BaseCallback):
 
 
 def _tensors(ppo: PPO) -> dict[str, torch.Tensor]:
-    """Network and optimiser as named tensors."""
+    """Network and optimiser as named tensors: a file of them needs no unpickling to be read."""
     network = {f"network.{name}": value for name, value in ppo.policy.state_dict().items()}
     adam = {
         f"optimizer.{parameter}.{name}": torch.as_tensor(value)

@@ -71,6 +71,7 @@ def known_frames(
     problem = envs.problem
     cost = tabulate(problem, seeds, tick=tick).table(problem.config.reward).cost
     seen = []
+    # The same frames are met again with other memories: what was seen last depends on the actions.
     for number in range(ROLLOUTS):
         recorded = _Recorded(GuardedPolicy(RandomPolicy(number), guard))
         play_drives(recorded, envs, seeds, tick=tick)
@@ -110,6 +111,7 @@ def warm_start(network: ActorCriticPolicy, known: KnownFrames, *, seed: int) -> 
     batches = -(-count // BATCH)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, PASSES * batches)
     network.set_training_mode(True)
+    # No loss touches the critic: its gradients stay None, and AdamW leaves such parameters alone.
     for _ in range(PASSES):
         for rows in torch.randperm(count, generator=generator).split(BATCH):
             actor: Any = network.get_distribution(known.observations[rows]).distribution
