@@ -17,14 +17,14 @@ from torch import Tensor
 
 from benchmarks.rows import row
 from benchmarks.turns import alternately
-from unwrap.networks.engines import Prepared
+from unwrap.networks.engines import Engine
 from unwrap.networks.network import Settings, arithmetic
 from unwrap.networks.predictor import Unwrapper, load_unwrapper
-from unwrap.networks.registry import build
+from unwrap.networks.registry import build_network
 from unwrap.networks.weight_files import save_weights
 from unwrap.signal.description import SensorDescription
 from unwrap.signal.sensed import Sensed, Truth
-from unwrap.training.allocator import keep_freed_memory
+from unwrap.support.process_state import keep_freed_memory
 from unwrap.training.config import TrainConfig
 from unwrap.training.loop import TrainingModule
 
@@ -68,7 +68,7 @@ def untrained(path: Path, device: torch.device) -> Unwrapper:
         "trained_height": HEIGHT,
         "trained_width": WIDTH,
     }
-    save_weights(path, build("tofregnet", settings), metadata)
+    save_weights(path, build_network("tofregnet", settings), metadata)
     unwrapper = load_unwrapper(path)
     unwrapper.network.to(device)
     return unwrapper
@@ -105,7 +105,7 @@ def training(unwrapper: Unwrapper, device: torch.device, batch: int, rounds: int
 
 def outside(unwrapper: Unwrapper, device: torch.device, rounds: int) -> dict[str, Any]:
     """Share of the time of `Unwrapper.predict` that is not its network's."""
-    gray, network = images(1, device), Prepared(unwrapper.network, device)
+    gray, network = images(1, device), Engine(unwrapper.network, device)
     features = unwrapper.network.features(Sensed(gray), SensorDescription())
 
     @torch.inference_mode()

@@ -24,7 +24,7 @@ from shotenv.sensor import (
     scored_pixels,
     stream_seed,
 )
-from unwrap.depth import move_depth, unwrapped
+from unwrap.depth import move_depth, correct_sensed
 from unwrap.signal import GRAY_FULL_SCALE, Memory, Sensed, SensorDescription, Shots, Truth
 from unwrap.support import concatenate, mapped
 
@@ -173,7 +173,7 @@ class SensedFrames:
         starts = self._starts(frames)
         before = torch.maximum(frames - 1, starts)
         sensed = self._sensed(before, draw, shots)
-        depth = unwrapped(sensed, self._true_m(before), self.sensor)
+        depth = correct_sensed(sensed, self._true_m(before), self.sensor)
         seen = depth.valid & (frames > starts)[:, None, None]
         return self._moved(depth.distance_m.masked_fill(~seen, torch.nan), frames)
 
@@ -189,5 +189,5 @@ class SensedFrames:
     def _measured_truth(self, index: int) -> Truth:
         """What eight samples tell of one frame, where the frequencies agree."""
         sensed = self._sensed(torch.tensor([index]), RECORDED_DRAW, Shots.EIGHT)
-        depth = unwrapped(sensed, None, self.sensor)
+        depth = correct_sensed(sensed, None, self.sensor)
         return Truth(depth.distance_m.nan_to_num(0.0), depth.valid)

@@ -132,7 +132,7 @@ def predict(
         noise_lsb=noise_lsb,
         shift_m=drive.drift_m,
     )
-    return problem.fusion.look(sensed, problem.description).distance_m
+    return problem.fusion.predict_sensed(sensed, problem.description).distance_m
 
 
 def measure(

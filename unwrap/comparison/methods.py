@@ -15,12 +15,12 @@ from unwrap.comparison.plan import Training
 from unwrap.depth import (
     ReflectancePrior,
     calibrate,
+    correct_sensed,
     unwrap_amplitude,
     unwrap_kernel_density,
-    unwrapped,
 )
 from unwrap.networks import Unwrapper
-from unwrap.signal import Sensed, SensorDescription, Shots, samples_of
+from unwrap.signal import Sensed, SensorDescription, Shots
 from unwrap.support import on_device
 from unwrap.training import acquiring_threads, in_order, loader
 
@@ -78,7 +78,7 @@ def methods_of(training: Training, network: Unwrapper) -> Iterator[Method]:
     def own(sensed: Sensed, sensor: SensorDescription) -> Estimate:
         # The rules of merging ask for the same frames one after the other.
         if not (seen and seen[-1][0] is sensed):
-            found = network.look(sensed, sensor)
+            found = network.predict_sensed(sensed, sensor)
             probable = training.config.network in PROBABILITIES
             estimate = Estimate(found.distance_m, found.confidence if probable else None)
             seen[:] = [(sensed, estimate)]
@@ -87,7 +87,7 @@ def methods_of(training: Training, network: Unwrapper) -> Iterator[Method]:
     def merged(rule: Any) -> Look:
         def look(sensed: Sensed, sensor: SensorDescription) -> Estimate:
             found = own(sensed, sensor)
-            depth = unwrapped(sensed, found.depth_m, sensor, merge=rule)
+            depth = correct_sensed(sensed, found.depth_m, sensor, merge=rule)
             return replace(found, depth_m=depth.distance_m)
 
         return look
@@ -113,11 +113,11 @@ def classical_methods(
     def eight(sensed: Sensed, sensor: SensorDescription) -> Estimate:
         # The candidate stands, however far the frequencies disagree and however weak the signal.
         lenient = replace(sensor, max_residual_m=math.inf, min_snr=0.0)
-        return Estimate(unwrapped(sensed, None, lenient).distance_m)
+        return Estimate(correct_sensed(sensed, None, lenient).distance_m)
 
     def kernel_density(sensed: Sensed, sensor: SensorDescription) -> Estimate:
         found = unwrap_kernel_density(
-            samples_of(sensed),
+            sensed.require_raw(),
             sensor,
             offset_lsb=sensed.offset_lsb,
             noise_lsb=sensed.noise_lsb,
@@ -129,9 +129,9 @@ def classical_methods(
 
     def amplitude(sensed: Sensed, sensor: SensorDescription) -> Estimate:
         found = unwrap_amplitude(
-            samples_of(sensed),
+            sensed.require_raw(),
             sensor,
-            prior=priors[samples_of(sensed).shots],
+            prior=priors[sensed.require_raw().shots],
             offset_lsb=sensed.offset_lsb,
             noise_lsb=sensed.noise_lsb,
             shift_m=sensed.shift_m,

@@ -11,7 +11,7 @@ from PIL import Image
 from torch import Tensor
 
 from shotenv.dataset import SensedFrames
-from unwrap.depth import unwrapped
+from unwrap.depth import correct_sensed
 from unwrap.networks import Unwrapper
 from unwrap.pictures import (
     CYCLIC,
@@ -124,10 +124,10 @@ def _row(
         _tile("wrapped, 4 DCS", wrapped_distance_m(sensed, frames.sensor), maps["wrapped"]),
     ]
     for name, network in networks.items():
-        found = network.look(sensed, frames.sensor)
+        found = network.predict_sensed(sensed, frames.sensor)
         tiles.append(_tile(name, found.distance_m, maps["distance"]))
         if network.network.needs == "gray":
-            depth = unwrapped(sensed, found.distance_m, frames.sensor)
+            depth = correct_sensed(sensed, found.distance_m, frames.sensor)
             tiles.append(_tile("corrected", depth.distance_m, maps["distance"]))
     tiles.append(_tile(f"confidence of {name}", found.confidence, maps["confidence"]))
     return column([text(frames.families[number].replace("_", " "), LARGE_PX), line(tiles)])

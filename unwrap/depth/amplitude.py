@@ -1,12 +1,16 @@
 """Single-frequency unwrapping by amplitude and smoothness, after Crabb and Manduchi (2014, 2015).
 
 R. Crabb, R. Manduchi, Probabilistic Phase Unwrapping for Single-Frequency Time-of-Flight Range
-Cameras, 3DV 2014, and Fast Single-Frequency Time-of-Flight Range Imaging, CVPR Workshops 2015. The
-amplitude falls as reflectance / distance^2, so that every wrap of a pixel implies a reflectance;
-how likely that is, is the cost of the wrap, and neighbouring distances are to agree. Adapted: the
-prior on the reflectance, which here holds the tilt of the surface, too, and that on the wrap are
-histograms measured on training frames; the energy is minimised by min-sum belief propagation in
-sweeps over rows and columns, which is one vector operation per step.
+Cameras, 3DV 2014, and Fast Single-Frequency Time-of-Flight Range Imaging, CVPR Workshops 2015.
+
+The amplitude is reflectance / distance^2 times a constant, so that each wrap of a pixel implies a
+reflectance: with an amplitude of 100 LSB at 1 m for a white surface, 4 LSB at a phase of 2 m mean a
+reflectance of 0.16 in the first wrap and an impossible 2.7 in the second, at 8.2 m. A Markov random
+field weighs how likely the implied reflectances are against how well neighbours agree.
+
+Adapted: the prior on the reflectance, which here includes the tilt of the surface, and that on the
+wrap are histograms measured on training frames; the energy is minimised by min-sum belief
+propagation in sweeps over rows and columns, which is one vector operation per step.
 """
 
 from __future__ import annotations
@@ -16,12 +20,18 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from unwrap.depth.candidates import Unwrapped, candidates_m, chosen, require_shots, unwrapped
+from unwrap.depth.candidates import (
+    DepthWithConfidence,
+    candidates_m,
+    chosen,
+    depth_with_confidence,
+    require_shots,
+)
 from unwrap.depth.reflectance import ReflectancePrior
 from unwrap.signal import PhaseFrame, RawFrame, SensorDescription, Shots, decode_at
 
 BEYOND = 1e3
-"""Cost of a candidate beyond the range."""
+"""Cost of a candidate beyond the range: more than any -ln p, and finite, so that sums stay so."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +68,11 @@ def unwrap_amplitude(
     noise_lsb: Tensor | float | None = None,
     shift_m: Tensor | None = None,
     smoothness: Smoothness | None = None,
-) -> Unwrapped:
-    """Depth of two or four samples; the confidence is the probability of the wrap.
+) -> DepthWithConfidence:
+    """Depth of two or four samples; the confidence estimates the probability of the wrap.
 
-    It is that of the min-marginals, softmax of minus the beliefs, and too high where messages went
-    round in loops.
+    It is the softmax of minus the beliefs, and too high where messages went round in loops of the
+    grid and were counted more than once.
 
     Parameters
     ----------
@@ -87,7 +97,7 @@ def unwrap_amplitude(
     weight = first.amplitude.add(noise).log()
     beliefs = min_sum(cost, depth_m, weight, smoothness)
     confidence, wraps = beliefs.neg().softmax(1).max(1)
-    return unwrapped(
+    return depth_with_confidence(
         chosen(depth_m, wraps),
         confidence,
         first,
@@ -131,23 +141,22 @@ def min_sum(cost: Tensor, depth_m: Tensor, logarithm: Tensor, smoothness: Smooth
     logarithm : float [B, H, W]
         Logarithm of the amplitude, which tells edges.
     """
-    # Lines first, then [B, N, K]: one step of a sweep works on the K lines that lie side by side.
+    # Axis of the sweep first: one step goes from a line to the next, for all K pixels of a line at
+    # once, [L, B, N, K].
     columns, rows = (3, 0, 1, 2), (2, 0, 1, 3)
     edges = {
-        order: _edges(depth_m.permute(order), _lines(logarithm, order), smoothness)
+        order: _edges(depth_m.permute(order), logarithm.unsqueeze(1).permute(order), smoothness)
         for order in (columns, rows)
     }
     incoming = {order: torch.zeros_like(cost) for order in (columns, rows)}
     for _ in range(smoothness.rounds):
         for order, other in ((columns, rows), (rows, columns)):
-            lines = (cost + incoming[other]).permute(order)
-            back = tuple(order.index(axis) for axis in range(4))
-            incoming[order] = _both_ways(lines, edges[order]).permute(back)
+            lines, edge = (cost + incoming[other]).permute(order), edges[order]
+            forth = _messages(lines, edge)
+            # The way back is the way forth through everything reversed.
+            back = _messages(lines.flip(0), edge.flip(0).transpose(2, 3)).flip(0)
+            incoming[order] = (forth + back).permute([order.index(axis) for axis in range(4)])
     return cost + incoming[columns] + incoming[rows]
-
-
-def _lines(image: Tensor, order: tuple[int, ...]) -> Tensor:
-    return image.unsqueeze(1).permute(order)
 
 
 def _edges(depth_m: Tensor, logarithm: Tensor, smoothness: Smoothness) -> Tensor:
@@ -157,17 +166,11 @@ def _edges(depth_m: Tensor, logarithm: Tensor, smoothness: Smoothness) -> Tensor
     return apart.clamp_(max=smoothness.largest_m).mul_(smoothness.per_m * alike)
 
 
-def _both_ways(lines: Tensor, edges: Tensor) -> Tensor:
-    """Sum of the messages that come from both ends of the lines, [L, B, N, K]."""
-    forth = _messages(lines, edges)
-    back = _messages(lines.flip(0), edges.flip(0).transpose(2, 3))
-    return forth + back.flip(0)
-
-
 def _messages(lines: Tensor, edges: Tensor) -> Tensor:
-    """Messages [L, B, N, K] from each line to the next; the least is 0."""
+    """Messages [L, B, N, K] from each line to the next; the least of each pixel is 0."""
     sent = torch.zeros_like(lines)
     for i, edge in enumerate(edges):
         best = (lines[i] + sent[i]).unsqueeze(2).add(edge).amin(1)
+        # Only differences count; without this they would grow with every line.
         sent[i + 1] = best - best.amin(1, keepdim=True)
     return sent

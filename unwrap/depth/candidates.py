@@ -1,4 +1,4 @@
-"""What the peers without a network share: wrap candidates, and the depth that they return."""
+"""What the classical methods share: wrap candidates, and depth with its confidence."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from unwrap.signal import (
     RawFrame,
     SensorDescription,
     distance_m,
+    is_strong,
     unambiguous_range_m,
 )
 
 
 @dataclass(frozen=True)
-class Unwrapped:
+class DepthWithConfidence:
     """Depth of a frame and how sure the method is of it; batch B.
 
     Attributes
@@ -35,18 +36,26 @@ class Unwrapped:
 
 
 def candidates_m(phase_rad: Tensor, frequency_hz: float, max_range_m: float) -> Tensor:
-    """Distances [B, N, H, W] with this phase [B, H, W], nearest first, N = those in the range."""
+    """Wrap candidates [B, N, H, W] of a phase [B, H, W]: distances with that phase, nearest first.
+
+    N is the number of wraps that begin within the range, so that the last candidate may lie beyond.
+
+    Examples
+    --------
+    >>> candidates_m(torch.zeros(1, 1, 1), 24e6, 25.0).flatten()
+    tensor([ 0.0000,  6.2457, 12.4914, 18.7370, 24.9827])
+    """
     unambiguous_m = unambiguous_range_m(frequency_hz)
     wraps = torch.arange(math.floor(max_range_m / unambiguous_m) + 1, device=phase_rad.device)
     return distance_m(phase_rad, frequency_hz).unsqueeze(1) + wraps.view(-1, 1, 1) * unambiguous_m
 
 
 def chosen(values: Tensor, index: Tensor) -> Tensor:
-    """Of values [B, N, H, W], those at index [B, H, W]: [B, H, W]."""
+    """Of values [B, N, H, W] of the candidates, those of candidate `index` [B, H, W]."""
     return values.gather(1, index.unsqueeze(1)).squeeze(1)
 
 
-def unwrapped(
+def depth_with_confidence(
     depth_m: Tensor,
     confidence: Tensor,
     first: PhaseFrame,
@@ -55,15 +64,15 @@ def unwrapped(
     *,
     noise_lsb: Tensor | float,
     min_confidence: float,
-) -> Unwrapped:
-    """Valid where the signal is strong enough, not saturated, and the confidence high enough."""
-    valid = (first.amplitude >= sensor.min_snr * noise_lsb) & ~raw.saturated
+) -> DepthWithConfidence:
+    """Depth, valid where it is strong, not saturated, and its confidence is high enough."""
+    valid = is_strong(first.amplitude, noise_lsb, sensor) & ~raw.saturated
     valid &= confidence >= min_confidence
     unambiguous_m = unambiguous_range_m(sensor.f1_hz)
     frame = DepthFrame(
         depth_m, valid, first.phase_rad, first.amplitude, first.residual, unambiguous_m
     )
-    return Unwrapped(frame, confidence)
+    return DepthWithConfidence(frame, confidence)
 
 
 def require_shots(raw: RawFrame, allowed: tuple[int, ...]) -> None:

@@ -1,4 +1,4 @@
-"""Calibration of confidences: the share that is right among those that say p should be p.
+"""Calibration of confidences: of the pixels with confidence p, a share p should be right.
 
 Expected calibration error and reliability diagram as in Guo, Pleiss, Sun and Weinberger, On
 Calibration of Modern Neural Networks (2017), and their temperature scaling.
@@ -52,7 +52,15 @@ def reliability(confidence: Tensor, right: Tensor, *, bins: int = BINS) -> Relia
         Unequal shapes, nothing to count, a `right` that is not bool, a confidence outside 0..1,
         or fewer than one bin.
     """
-    _check(confidence, right, bins)
+    if confidence.shape != right.shape or not confidence.numel():
+        shapes = (tuple(confidence.shape), tuple(right.shape))
+        raise ValueError(f"confidence, right are {shapes}; expected one shape, not empty")
+    if right.dtype != torch.bool:
+        raise ValueError(f"right is {right.dtype}; expected torch.bool")
+    if not bool(((confidence >= 0) & (confidence <= 1)).all()):  # False for NaN, too.
+        raise ValueError("confidence holds NaN or values outside 0..1")
+    if bins < 1:
+        raise ValueError(f"bins is {bins}; expected at least 1")
     values = confidence.detach().flatten().double()
     place = (values * bins).long().clamp(max=bins - 1)
     counts = torch.bincount(place, minlength=bins)
@@ -104,10 +112,16 @@ def fit_temperature(logits: Tensor, target: Tensor) -> float:
 def golden_section(
     function: Callable[[float], float], low: float, high: float, *, tolerance: float = 1e-4
 ) -> float:
-    """Place of the minimum of a unimodal function on [low, high] (Kiefer 1953).
+    """Place of the minimum of a unimodal function on [low, high], with low > 0 (Kiefer 1953).
 
     `tolerance` is relative to the place.
+
+    Examples
+    --------
+    >>> round(golden_section(lambda x: (x - 2) ** 2, 1.0, 5.0), 3)
+    2.0
     """
+    # The interval shrinks by this factor, at which one of the two inner places serves again.
     ratio = (5**0.5 - 1) / 2
     left, right = high - ratio * (high - low), low + ratio * (high - low)
     at_left, at_right = function(left), function(right)
@@ -121,15 +135,3 @@ def golden_section(
             right = low + ratio * (high - low)
             at_right = function(right)
     return (low + high) / 2
-
-
-def _check(confidence: Tensor, right: Tensor, bins: int) -> None:
-    if confidence.shape != right.shape or not confidence.numel():
-        shapes = (tuple(confidence.shape), tuple(right.shape))
-        raise ValueError(f"confidence, right are {shapes}; expected one shape, not empty")
-    if right.dtype != torch.bool:
-        raise ValueError(f"right is {right.dtype}; expected torch.bool")
-    if not bool(((confidence >= 0) & (confidence <= 1)).all()):  # False for NaN, too.
-        raise ValueError("confidence holds NaN or values outside 0..1")
-    if bins < 1:
-        raise ValueError(f"bins is {bins}; expected at least 1")

@@ -6,6 +6,8 @@ frequencies, and need the prediction only where these disagree.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import torch
 from torch import Tensor
@@ -41,9 +43,9 @@ def correct(
     noise_lsb: Tensor | float | None = None,
     shift_m: Tensor | None = None,
 ) -> DepthFrame:
-    """Unwrapped depth of a batch of frames with the same number of samples.
+    """Unwrap the samples of a batch of frames, by a prediction or by their two frequencies.
 
-    Pixels that are invalid hold the prediction, the best guess there is, or NaN without one.
+    Pixels that are not valid hold the prediction, the best guess there is, or NaN without one.
 
     Parameters
     ----------
@@ -52,8 +54,9 @@ def correct(
     predicted_m : float32 [B, H, W] or None
         A network's coarse distance. None is allowed with eight samples.
     merge : "nearest", "floor" or "none"
-        The nearest wrap candidate, ours; eq. 6; or the prediction as it is, for networks that
-        refine the measured distance. For TofSegNet, whose prediction lies within its likeliest
+        Rule by which the prediction tells the wraps, see `unwrap.depth.merge`: the wrap candidate
+        nearest to it (ours); its own whole wraps (eq. 6); or no merging, for networks that refine
+        the measured distance themselves. For TofSegNet, whose prediction lies within its likeliest
         class, "floor" is eq. 8, with the prediction where the sensor saturates.
     offset_lsb : float [H, W] or [B, H, W], optional
         Stored dark-offset map.
@@ -67,41 +70,61 @@ def correct(
     ValueError
         Two or four samples without a prediction, an unknown merge, or samples that `decode`
         refuses.
+
+    Examples
+    --------
+    Two samples of a pixel at a wrapped distance of 0, and a network that says 7 m: one wrap.
+
+    >>> raw = RawFrame(torch.tensor([100.0, 0.0]).view(1, 2, 1, 1), torch.zeros(1, 1, 1).bool())
+    >>> frame = correct(raw, torch.full((1, 1, 1), 7.0), SensorDescription())
+    >>> frame.distance_m, frame.valid
+    (tensor([[[6.2457]]]), tensor([[[True]]]))
     """
     if merge not in RULES:
         raise ValueError(f"merge is {merge!r}; expected one of {', '.join(RULES)}")
     noise = sensor.noise_lsb if noise_lsb is None else noise_lsb
+    calibration = _Calibration(sensor, offset_lsb, noise, shift_m)
     if raw.shots == Shots.EIGHT:
-        return _by_two_frequencies(raw, predicted_m, sensor, merge, offset_lsb, noise, shift_m)
+        return _by_two_frequencies(raw, predicted_m, calibration, merge)
     if predicted_m is None:
         raise ValueError(f"predicted_m is None; {int(raw.shots)} samples cannot be unwrapped alone")
     if _can_loop(raw, predicted_m):
-        return _by_loop(raw, predicted_m, sensor, merge, offset_lsb, noise, shift_m)
-    return _by_torch(raw, predicted_m, sensor, merge, offset_lsb, noise, shift_m)
+        return _by_loop(raw, predicted_m, calibration, merge)
+    return _by_torch(raw, predicted_m, calibration, merge)
+
+
+class _Calibration(NamedTuple):
+    """What is known of the sensor, and of these frames beside their samples; see `correct`."""
+
+    sensor: SensorDescription
+    offset_lsb: Tensor | None
+    noise_lsb: Tensor | float
+    shift_m: Tensor | None
+
+    def first_phase(self, raw: RawFrame) -> PhaseFrame:
+        """Phase and amplitude at f1."""
+        return decode_at(0, raw, self.sensor, offset_lsb=self.offset_lsb, shift_m=self.shift_m)
+
+    def valid(self, first: PhaseFrame, raw: RawFrame) -> Tensor:
+        """Where the signal at f1 is strong and not saturated."""
+        return is_strong(first.amplitude, self.noise_lsb, self.sensor) & ~raw.saturated
 
 
 def _by_two_frequencies(
-    raw: RawFrame,
-    predicted_m: Tensor | None,
-    sensor: SensorDescription,
-    merge: Merge,
-    offset_lsb: Tensor | None,
-    noise_lsb: Tensor | float,
-    shift_m: Tensor | None,
+    raw: RawFrame, predicted_m: Tensor | None, calibration: _Calibration, merge: Merge
 ) -> DepthFrame:
     """Eight samples: the prediction is asked only where the frequencies disagree."""
-    first = decode_at(0, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
-    # Of the second frequency nothing but the phase is needed.
-    cosine, sine, *_ = quadratures(samples_at(1, raw), offset_lsb)
+    sensor, first = calibration.sensor, calibration.first_phase(raw)
+    # Of the second frequency nothing but the phase is needed, so it is not decoded as a whole.
+    cosine, sine, *_ = quadratures(samples_at(1, raw), calibration.offset_lsb)
     depth_m, residual_m = unwrap_dual(
         first.phase_rad,
-        phase_at(1, cosine, sine, sensor, shift_m=shift_m),
+        phase_at(1, cosine, sine, sensor, shift_m=calibration.shift_m),
         sensor.f1_hz,
         sensor.f2_hz,
         max_range_m=sensor.max_range_m,
     )
-    agree = residual_m <= sensor.max_residual_m
-    valid = is_strong(first.amplitude, noise_lsb, sensor) & ~raw.saturated
+    agree, valid = residual_m <= sensor.max_residual_m, calibration.valid(first, raw)
     if predicted_m is None:
         return _frame(depth_m, valid & agree, first, torch.nan, sensor)
     depth_m = torch.where(agree, depth_m, _merged(first, predicted_m, sensor, merge))
@@ -109,24 +132,18 @@ def _by_two_frequencies(
 
 
 def _by_torch(
-    raw: RawFrame,
-    predicted_m: Tensor,
-    sensor: SensorDescription,
-    merge: Merge,
-    offset_lsb: Tensor | None,
-    noise_lsb: Tensor | float,
-    shift_m: Tensor | None,
+    raw: RawFrame, predicted_m: Tensor, calibration: _Calibration, merge: Merge
 ) -> DepthFrame:
     """Two or four samples, by torch's operations: on any device, and with gradients."""
-    first = decode_at(0, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
-    valid = is_strong(first.amplitude, noise_lsb, sensor) & ~raw.saturated
-    return _frame(_merged(first, predicted_m, sensor, merge), valid, first, predicted_m, sensor)
+    sensor, first = calibration.sensor, calibration.first_phase(raw)
+    depth_m = _merged(first, predicted_m, sensor, merge)
+    return _frame(depth_m, calibration.valid(first, raw), first, predicted_m, sensor)
 
 
 def _merged(
     first: PhaseFrame, predicted_m: Tensor, sensor: SensorDescription, merge: Merge
 ) -> Tensor:
-    """The first frequency's wrapped map, unwrapped by the prediction."""
+    """Wrapped distance at f1, unwrapped by the prediction."""
     return RULES[merge].of_tensors(
         predicted_m,
         distance_m(first.phase_rad, sensor.f1_hz),
@@ -162,62 +179,53 @@ def _can_loop(raw: RawFrame, predicted_m: Tensor) -> bool:
 
 
 def _by_loop(
-    raw: RawFrame,
-    predicted_m: Tensor,
-    sensor: SensorDescription,
-    merge: Merge,
-    offset_lsb: Tensor | None,
-    noise_lsb: Tensor | float,
-    shift_m: Tensor | None,
+    raw: RawFrame, predicted_m: Tensor, calibration: _Calibration, merge: Merge
 ) -> DepthFrame:
     """Two or four samples, by compiled loops: several times faster than torch on processors."""
-    cosine, sine, amplitude, residual = quadratures(raw.dcs_lsb, offset_lsb)
-    # The quadratures lend their memory: what is in the processor's cache need not be fetched.
+    sensor, shift_m = calibration.sensor, calibration.shift_m
+    cosine, sine, amplitude, residual = quadratures(raw.dcs_lsb, calibration.offset_lsb)
+    # The phase overwrites the cosine, the distance the sine: both maps belong to this function
+    # alone, and lie in the processor's cache, where new memory would have to be fetched.
     phase_rad, depth_m = torch.atan2(sine, cosine, out=cosine), sine
     valid = torch.empty(raw.saturated.shape, dtype=torch.bool)
     unambiguous_m = unambiguous_range_m(sensor.f1_hz)
+    shift_turns = np.zeros(len(valid), np.float32)
+    if shift_m is not None:
+        # Python's remainder, in float64 and never negative, as in `shift_turns_`.
+        shift_turns[:] = shift_m.numpy() % unambiguous_m / unambiguous_m
     merge_pixels(
         array(phase_rad),
-        (FLAT if sensor.wiggle is None else sensor.wiggle[0]).straight,
-        _shift_turns(shift_m, unambiguous_m, len(valid)),
+        (FLAT if sensor.wiggle is None else sensor.wiggle[0]).turns_table,
+        shift_turns,
         array(amplitude),
-        array_of(noise_lsb, valid.shape),
+        array_of(calibration.noise_lsb, valid.shape),
         array(raw.saturated, np.bool_),
         array(predicted_m),
         Limits(*map(np.float32, (unambiguous_m, sensor.saturation_range_m, sensor.min_snr))),
         RULES[merge].branch,
+        # Written to; both are contiguous, so that `array` gives their own memory.
         array(depth_m),
         array(valid, np.bool_),
     )
     return DepthFrame(depth_m, valid, phase_rad, amplitude, residual, unambiguous_m)
 
 
-def _shift_turns(shift_m: Tensor | None, unambiguous_m: float, batch: int) -> np.ndarray:
-    """A shift of each frame, float32 [B], as a share of the unambiguous range."""
-    turns = np.zeros(batch, np.float32)
-    if shift_m is not None:
-        turns[:] = shift_m.numpy() % unambiguous_m / unambiguous_m
-    return turns
-
-
-def unwrapped(
+def correct_sensed(
     sensed: Sensed,
     predicted_m: Tensor | None,
     sensor: SensorDescription,
     *,
     merge: Merge = "nearest",
 ) -> DepthFrame:
-    """`unwrap.depth.correction.correct` of frames with samples and a prediction [B, H, W] for them.
+    """`correct` for frames as networks see them.
 
     Raises
     ------
     ValueError
         No samples, or what `correct` refuses.
     """
-    if sensed.raw is None:
-        raise ValueError("raw is None; expected samples")
     return correct(
-        sensed.raw,
+        sensed.require_raw(),
         predicted_m,
         sensor,
         merge=merge,

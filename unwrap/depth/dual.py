@@ -1,4 +1,4 @@
-"""Two-frequency unwrapping: the pair of wrap candidates that agree best, within a range."""
+"""Two-frequency unwrapping: the pair of wrap candidates that agrees best, within a range."""
 
 from __future__ import annotations
 
@@ -39,17 +39,35 @@ def unwrap_dual(
     ------
     ValueError
         Unequal shapes, or a frequency or range that is not positive.
+
+    Examples
+    --------
+    Phases of a surface at 10 m, beyond the unambiguous range of 24 MHz, 6.25 m:
+
+    >>> phases = [torch.tensor([4 * torch.pi * f / 299_792_458 * 10.0]) for f in (24e6, 10e6)]
+    >>> wrapped = [phase.remainder(2 * torch.pi) for phase in phases]
+    >>> distance_m, residual_m = unwrap_dual(*wrapped, 24e6, 10e6, max_range_m=25.0)
+    >>> distance_m, bool(residual_m < 1e-4)
+    (tensor([10.0000]), True)
     """
-    _check(phase1_rad, phase2_rad, f1_hz, f2_hz, max_range_m)
+    if phase1_rad.shape != phase2_rad.shape:
+        raise ValueError(
+            f"phase2_rad has shape {tuple(phase2_rad.shape)}; expected that of phase1_rad, "
+            f"{tuple(phase1_rad.shape)}"
+        )
+    for name, value in (("f1_hz", f1_hz), ("f2_hz", f2_hz), ("max_range_m", max_range_m)):
+        if not (value > 0 and math.isfinite(value)):
+            raise ValueError(f"{name} is {value}; expected a positive number")
     range1_m, range2_m = unambiguous_range_m(f1_hz), unambiguous_range_m(f2_hz)
     wrapped1_m, wrapped2_m = distance_m(phase1_rad, f1_hz), distance_m(phase2_rad, f2_hz)
-    # Disagreements are held in wraps of f2, where the nearest candidate is a rounding away.
+    # Disagreements are held in wraps of f2: its nearest wrap is then found by rounding.
     gap = (wrapped1_m - wrapped2_m).mul_(1 / range2_m)
     last = math.floor(max_range_m / range1_m)
-    wraps = _nearest(gap, range1_m / range2_m, last + 1)
+    wraps = _best_wraps(gap, range1_m / range2_m, last + 1)
     if last:
+        # The last wrap ends beyond the range: only the nearer part of its distances is considered.
         fits = wrapped1_m < max_range_m - last * range1_m
-        wraps = torch.where(fits, wraps, _nearest(gap, range1_m / range2_m, last))
+        wraps = torch.where(fits, wraps, _best_wraps(gap, range1_m / range2_m, last))
     best = gap.add_(wraps, alpha=range1_m / range2_m)
     best.sub_(best.round())
     share2 = f2_hz**2 / (f1_hz**2 + f2_hz**2)
@@ -57,29 +75,20 @@ def unwrap_dual(
     return fused_m.clamp_(min=0), best.abs_().mul_(range2_m)
 
 
-def _nearest(gap: Tensor, wrap: float, count: int) -> Tensor:
+def _best_wraps(gap: Tensor, wrap: float, count: int) -> Tensor:
     """The n below `count` that brings `gap` + n `wrap` nearest to a whole number.
 
     Candidate n fits exactly where the fraction of the gap is that of -n `wrap`. On the circle of
-    fractions it is the nearest one up to half way to its neighbours.
+    fractions it is the nearest one up to half way to its neighbours. So each pixel needs `count`
+    comparisons with constants, and no distance to each of the candidates.
     """
     places = sorted((-n * wrap % 1.0, n) for n in range(count))
     # From half way between the last place and the first, that of no wrap, all the way round.
     start = (places[-1][0] + 1.0) / 2.0
     turned = gap.add(2.0 - start).frac_()
     wraps, beyond = torch.zeros_like(gap), torch.empty_like(gap)
+    # A staircase: at each border the n of the place before gives way to that of the place after.
     for (low, before), (high, after) in pairwise(places):
         torch.ge(turned, (low + high) / 2.0 + 1.0 - start, out=beyond)
         wraps.add_(beyond, alpha=after - before)
     return wraps
-
-
-def _check(phase1: Tensor, phase2: Tensor, f1_hz: float, f2_hz: float, max_range_m: float) -> None:
-    if phase1.shape != phase2.shape:
-        raise ValueError(
-            f"phase2_rad has shape {tuple(phase2.shape)}; expected that of phase1_rad, "
-            f"{tuple(phase1.shape)}"
-        )
-    for name, value in (("f1_hz", f1_hz), ("f2_hz", f2_hz), ("max_range_m", max_range_m)):
-        if not (value > 0 and math.isfinite(value)):
-            raise ValueError(f"{name} is {value}; expected a positive number")

@@ -16,7 +16,13 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from unwrap.depth.candidates import Unwrapped, candidates_m, chosen, require_shots, unwrapped
+from unwrap.depth.candidates import (
+    DepthWithConfidence,
+    candidates_m,
+    chosen,
+    depth_with_confidence,
+    require_shots,
+)
 from unwrap.signal import (
     TWO_PI,
     PhaseFrame,
@@ -75,7 +81,7 @@ def unwrap_kernel_density(
     noise_lsb: Tensor | float | None = None,
     shift_m: Tensor | None = None,
     parameters: KernelDensity | None = None,
-) -> Unwrapped:
+) -> DepthWithConfidence:
     """Depth of eight samples; the confidence is the winner's share of its neighbours' weight.
 
     Parameters
@@ -97,11 +103,9 @@ def unwrap_kernel_density(
         decode_at(i, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m) for i in (0, 1)
     )
     depth_m, weight = _hypotheses(first, second, sensor, noise, parameters)
-    density = kernel_density(depth_m, weight, parameters)
-    confidence, winner = density.max(1)
-    best_m = chosen(depth_m, winner)
-    return unwrapped(
-        best_m,
+    confidence, winner = kernel_density(depth_m, weight, parameters).max(1)
+    return depth_with_confidence(
+        chosen(depth_m, winner),
         confidence,
         first,
         raw,
@@ -123,7 +127,8 @@ def _hypotheses(
     first_m = candidates_m(first.phase_rad, sensor.f1_hz, sensor.max_range_m)
     gap = (first_m - distance_m(second.phase_rad, sensor.f2_hz).unsqueeze(1)) / range2_m
     mismatch_m = (gap - gap.round()) * range2_m
-    # Four samples: the variance of the phase is (noise / A)^2 / 2.
+    # Four samples: the variance of the phase is (noise / A)^2 / 2. The clamp is for pixels without
+    # signal, whose variance is to be large rather than infinite.
     variance1, variance2 = (
         (noise / frame.amplitude.clamp(min=1e-6)).square().unsqueeze(1) / 2
         for frame in (first, second)
@@ -133,6 +138,7 @@ def _hypotheses(
     cost = mismatch_m.square() / (parameters.mismatch_scale * variance_m2)
     unsure = (variance1 + variance2) / parameters.phase_scale_rad2
     weight = torch.exp(-0.5 * (cost + unsure)).where(first_m <= sensor.max_range_m, 0.0)
+    # Fused by inverse variance, which goes with f^2, as in `unwrap_dual`.
     share2 = sensor.f2_hz**2 / (sensor.f1_hz**2 + sensor.f2_hz**2)
     fused_m = (first_m - share2 * mismatch_m).clamp(min=0)
     weight, order = weight.topk(min(parameters.hypotheses, weight.shape[1]), dim=1)
@@ -157,12 +163,14 @@ def kernel_density(depth_m: Tensor, weight: Tensor, parameters: KernelDensity) -
     """
     reach = parameters.radius
     height, width = depth_m.shape[-2:]
+    # Padding has weight 0: what lies outside the image does not vote.
     padded_m = functional.pad(depth_m, (reach,) * 4)
     padded_weight = functional.pad(weight, (reach,) * 4)
     steps = torch.arange(-reach, reach + 1)
     gauss = torch.exp(-0.5 * (steps / parameters.spread_px).square())
     line = (gauss / gauss.sum()).tolist()
     votes, total = torch.zeros_like(depth_m), torch.zeros_like(depth_m[:, :1])
+    # One shifted image after the other: all at once would take as many times the memory.
     for y, of_row in enumerate(line):
         for x, of_column in enumerate(line):
             window = (..., slice(y, y + height), slice(x, x + width))

@@ -1,8 +1,9 @@
 """Depth metrics: per image over valid pixels, then the mean over images.
 
-KITTI's development kit and the monodepth lineage both call a different number SqRel; both are
-given, named apart. Predictions are raised to `MIN_DEPTH_M` and true depths below it are left out,
-since iRMSE and the logarithmic error explode near 0.
+KITTI's development kit and the papers after Eigen et al. (2014) give the name SqRel to different
+numbers: e^2 / truth^2 and e^2 / truth; both are given, named apart. Predictions are raised to
+`MIN_DEPTH_M` and true depths below it are left out, since iRMSE and the logarithmic error explode
+near 0.
 """
 
 from __future__ import annotations
@@ -40,6 +41,13 @@ def depth_metrics(prediction_m: Tensor, truth_m: Tensor, valid: Tensor) -> dict[
     ------
     ValueError
         Shapes differ, or `valid` is not bool.
+
+    Examples
+    --------
+    >>> truth_m = torch.full((1, 2, 2), 10.0)
+    >>> metrics = depth_metrics(truth_m + 0.5, truth_m, torch.ones(1, 2, 2).bool())
+    >>> round(metrics["mae_m"], 3), round(metrics["abs_rel"], 3)
+    (0.5, 0.05)
     """
     if not (prediction_m.shape == truth_m.shape == valid.shape) or valid.ndim != 3:
         shapes = [tuple(tensor.shape) for tensor in (prediction_m, truth_m, valid)]
@@ -47,6 +55,7 @@ def depth_metrics(prediction_m: Tensor, truth_m: Tensor, valid: Tensor) -> dict[
     if valid.dtype != torch.bool:
         raise ValueError(f"valid is {valid.dtype}; expected torch.bool")
     used = valid & (truth_m >= MIN_DEPTH_M)
+    # Squares of float32 would lose digits where errors are small beside the depth.
     images = [
         _image_metrics(prediction.clamp(min=MIN_DEPTH_M).double(), truth.double())
         for prediction, truth in (

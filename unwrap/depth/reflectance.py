@@ -14,8 +14,7 @@ from unwrap.signal import (
     SensorDescription,
     Truth,
     first_phase,
-    noise_of,
-    samples_of,
+    sample_noise_lsb,
     unambiguous_range_m,
 )
 
@@ -58,7 +57,8 @@ class ReflectancePrior:
                 raise ValueError(f"{name} is {values}; expected {least} or more probabilities > 0")
 
     def log_density(self, at_1m_lsb: Tensor) -> Tensor:
-        """ln p of amplitudes times squared distances, of their shape."""
+        """ln p of the reflectances that amplitudes times squared distances (LSB m^2) imply."""
+        # Amplitude 0 has no logarithm; what is clamped falls into the lowest bin.
         reflectance = (at_1m_lsb / self.amplitude_at_1m_lsb).clamp(min=1e-30)
         table = torch.tensor(self.density, device=at_1m_lsb.device).log()
         return table[_bins(reflectance.log())]
@@ -66,8 +66,8 @@ class ReflectancePrior:
     def log_wraps(self, count: int) -> Tensor:
         """ln p of wraps 0..count - 1, float32 [count, 1, 1]; wraps never seen as the rarest."""
         rarest = min(self.wraps)
-        known = [*self.wraps[:count], *[rarest] * (count - len(self.wraps))]
-        return torch.tensor(known).log().view(-1, 1, 1)
+        shares = [*self.wraps[:count], *[rarest] * (count - len(self.wraps))]
+        return torch.tensor(shares).log().view(-1, 1, 1)
 
 
 def _bins(logarithm: Tensor) -> Tensor:
@@ -78,11 +78,12 @@ def _bins(logarithm: Tensor) -> Tensor:
 def calibrate(
     frames: Iterable[tuple[Sensed, Truth]], sensor: SensorDescription
 ) -> ReflectancePrior:
-    """Prior of frames with known distance, of two or more samples.
+    """Measure the prior on frames of known distance, of two or more samples.
 
-    Counted are unsaturated pixels of known truth within the sensor's range and a signal of at least
-    `MIN_SNR`; the wraps of all pixels of known truth in the range. The scale is a quantile and the
-    densities are counts, so that single mirrors or wrong truths change little.
+    Reflectances are those of pixels of known distance within the sensor's range that are not
+    saturated and have a signal of at least `MIN_SNR` times the noise; wraps those of all pixels of
+    known distance within the range. The scale is a quantile and the densities are counts, so that
+    a few mirrors or wrong distances change little.
 
     Raises
     ------
@@ -94,9 +95,9 @@ def calibrate(
         inside = truth.known & (truth.distance_m < sensor.max_range_m)
         inside &= truth.distance_m >= MIN_DISTANCE_M
         amplitude = first_phase(sensed, sensor).amplitude
-        strong = amplitude >= MIN_SNR * noise_of(sensed, sensor)
-        used = inside & strong & ~samples_of(sensed).saturated
-        strengths.append((amplitude * truth.distance_m.square())[used])
+        strong = amplitude >= MIN_SNR * sample_noise_lsb(sensed, sensor)
+        scored = inside & strong & ~sensed.require_raw().saturated
+        strengths.append((amplitude * truth.distance_m.square())[scored])
         wraps.append((truth.distance_m[inside] / unambiguous_range_m(sensor.f1_hz)).long())
     if not strengths or not sum(map(len, strengths)):
         raise ValueError("frames hold no pixel of known distance and enough signal")
@@ -110,6 +111,6 @@ def calibrate(
 
 
 def _shares(counts: Tensor) -> tuple[float, ...]:
-    """Counts to probabilities; every bin has seen a thousandth of the mean more than it has."""
+    """Counts to probabilities; a thousandth of the mean is added to each, so that none is 0."""
     values = counts.double() + counts.double().mean() * 1e-3
     return tuple((values / values.sum()).tolist())

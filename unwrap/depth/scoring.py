@@ -1,6 +1,6 @@
-"""How good each way of unwrapping is: always wrap 0, floor, nearest, two frequencies.
+"""Score every way of unwrapping: wrap 0 everywhere, floor, nearest, two frequencies.
 
-The caller brings raw frames, so that simulated and recorded ones are judged alike.
+The caller brings raw frames, so that simulated and recorded ones are scored alike.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Memory: depth of the previous frame, moved to where its points are seen now.
+"""Warping: depth of the previous frame, moved to where its points are seen now.
 
 Axes are a vehicle's: x ahead along the camera's axis, y left, z up. A positive yaw turns left, so
 that what is seen moves to the right, to higher columns. The camera is a pinhole with square pixels;
@@ -26,7 +26,8 @@ def move_depth(
 
     Every pixel's point falls onto the nearest pixel of the new view, and the nearer of two points
     wins. What is behind the camera or outside the view is lost. Pixels that no point falls onto are
-    unknown, but for holes a pixel wide, which open in surfaces that come nearer: see `bridged`.
+    unknown, but for holes a pixel wide, which open in surfaces that come nearer and are filled, see
+    `bridge_holes`.
 
     Parameters
     ----------
@@ -60,10 +61,14 @@ def move_depth(
     # Focal length in pixels: half the image's width lies under half the field of view.
     focal = width / 2 / math.tan(math.radians(horizontal_fov_deg) / 2)
     points = points_of(torch.where(known, distance_m, 0), focal)
-    ahead, left, up = moved(points, _per_frame(forward_m, points), _per_frame(yaw_rad, points))
+    # [1, 1, 1] or [B, 1, 1], of the type and on the device of the points.
+    forward, yaw = (
+        torch.as_tensor(value).to(points).reshape(-1, 1, 1) for value in (forward_m, yaw_rad)
+    )
+    ahead, left, up = to_new_camera(points, forward, yaw)
     column = ((width - 1) / 2 - focal * left / ahead).round()
     row = ((height - 1) / 2 - focal * up / ahead).round()
-    seen = known & (ahead > 0) & _within(column, width) & _within(row, height)
+    seen = known & (ahead > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
     place = torch.where(seen, row * width + column, 0).long()
     return splat(torch.stack((ahead, left, up)).square().sum(0).sqrt(), place, seen)
 
@@ -78,12 +83,20 @@ def points_of(distance_m: Tensor, focal: float) -> Tensor:
     return torch.stack((ahead, ahead * left, ahead * up))
 
 
-def moved(points: Tensor, forward_m: Tensor, yaw_rad: Tensor) -> Tensor:
+def to_new_camera(points: Tensor, forward_m: Tensor, yaw_rad: Tensor) -> Tensor:
     """Points [3, ...] in the axes of a camera that went `forward_m` on an arc and turned by yaw.
 
-    The chord of the arc has length forward sinc(yaw / 2) and the direction yaw / 2.
+    The chord of the arc has length forward sin(yaw / 2) / (yaw / 2) and the direction yaw / 2.
+
+    Examples
+    --------
+    A point 5 m ahead, after 1 m straight on:
+
+    >>> to_new_camera(torch.tensor([5.0, 0.0, 0.0]), torch.tensor(1.0), torch.tensor(0.0))
+    tensor([4., 0., 0.])
     """
     ahead, left, up = points
+    # torch's sinc has its own factor pi: sinc(x) = sin(pi x) / (pi x); it is 1 at yaw 0.
     chord_m = forward_m * torch.sinc(yaw_rad / (2 * math.pi))
     ahead, left = ahead - chord_m * (yaw_rad / 2).cos(), left - chord_m * (yaw_rad / 2).sin()
     cosine, sine = yaw_rad.cos(), yaw_rad.sin()
@@ -91,29 +104,30 @@ def moved(points: Tensor, forward_m: Tensor, yaw_rad: Tensor) -> Tensor:
 
 
 def splat(distance_m: Tensor, place: Tensor, seen: Tensor) -> Memory:
-    """The least of the distances [B, H, W] that are `seen` at each flat index `place`; bridged."""
+    """The least of the distances [B, H, W] that are `seen` at each flat index `place`, as a map.
+
+    Holes a pixel wide are bridged.
+    """
+    # Points that are not seen are offered at infinity, where they never win.
     offered = torch.where(seen, distance_m, torch.inf).flatten(1)
     nearest = torch.full_like(offered, torch.inf)
     nearest = nearest.scatter_reduce(1, place.flatten(1), offered, "amin").view_as(distance_m)
     for axis in (-1, -2):
-        nearest = bridged(nearest, axis)
+        nearest = bridge_holes(nearest, axis)
     known = nearest.isfinite()
     return Memory(torch.where(known, nearest, 0).float(), known.float())
 
 
-def bridged(distance_m: Tensor, axis: int) -> Tensor:
-    """Distances [B, H, W], where infinite the nearer of both neighbours along `axis`, if known."""
+def bridge_holes(distance_m: Tensor, axis: int) -> Tensor:
+    """Fill infinite distances [B, H, W] with the nearer of both neighbours along `axis`, if known.
+
+    Examples
+    --------
+    >>> bridge_holes(torch.tensor([[[4.0, torch.inf, 3.0, torch.inf]]]), -1)
+    tensor([[[4., 3., 3., inf]]])
+    """
     beyond = torch.full_like(distance_m.narrow(axis, 0, 1), torch.inf)
     padded = torch.cat((beyond, distance_m, beyond), axis)
     before, after = (padded.narrow(axis, at, distance_m.shape[axis]) for at in (0, 2))
-    held = before.isfinite() & after.isfinite() & ~distance_m.isfinite()
-    return torch.where(held, torch.minimum(before, after), distance_m)
-
-
-def _per_frame(value: Tensor | float, like: Tensor) -> Tensor:
-    """[1, 1, 1] or [B, 1, 1], of the type and on the device of `like`."""
-    return torch.as_tensor(value).to(like).reshape(-1, 1, 1)
-
-
-def _within(place: Tensor, length: int) -> Tensor:
-    return (place >= 0) & (place < length)
+    hole = before.isfinite() & after.isfinite() & ~distance_m.isfinite()
+    return torch.where(hole, torch.minimum(before, after), distance_m)

@@ -24,8 +24,7 @@ from unwrap.signal import (
     correlation_samples,
     decode,
     distance_m,
-    noise_of,
-    samples_of,
+    sample_noise_lsb,
     unambiguous_range_m,
     wrapped_distance_m,
 )
@@ -168,14 +167,14 @@ def sample_inputs(gray: Tensor, sensed: Sensed, sensor: SensorDescription) -> di
         known that in the dark; memory is left out.
     sensor : SensorDescription
     """
-    raw, zeros = samples_of(sensed), torch.zeros_like(sensed.gray)
+    raw, zeros = sensed.require_raw(), torch.zeros_like(sensed.gray)
     shift_m = zeros[:, 0, 0] if sensed.shift_m is None else sensed.shift_m
     return {
         "gray": gray,
         "dcs_lsb": raw.dcs_lsb,
         "saturated": raw.saturated,
         "offset_lsb": zeros if sensed.offset_lsb is None else sensed.offset_lsb,
-        "noise_lsb": zeros + noise_of(sensed, sensor),
+        "noise_lsb": zeros + sample_noise_lsb(sensed, sensor),
         "shift_m": shift_m.to(torch.float32),
     }
 

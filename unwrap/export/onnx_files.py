@@ -15,14 +15,14 @@ from torch import Tensor, nn
 
 from unwrap.depth import RULES, Merge
 from unwrap.export.export_frames import ExportFrames
-from unwrap.networks import Needs, Prediction, Unwrapper, predicted
+from unwrap.networks import Needs, Prediction, Unwrapper, predict_thinned
 from unwrap.signal import (
     GRAY_FULL_SCALE,
     RawFrame,
     Sensed,
     SensorDescription,
-    measured,
     unambiguous_range_m,
+    wrapped_and_valid,
 )
 
 OPSET = 20
@@ -50,12 +50,12 @@ class Exported(nn.Module):
         self.sensor, self.merge = sensor, merge
 
     def look(self, sensed: Sensed) -> Prediction:
-        """The network's prediction for frames, which are thinned for it as `Unwrapper.look` does.
+        """The network's prediction for frames, which are thinned for it as `Unwrapper.predict_sensed` does.
 
         In float32 wherever it runs, so that a file does not depend on the machine that wrote it.
         """
         stride = self.stride(*sensed.gray.shape[-2:])
-        return predicted(self.network, sensed, self.sensor, stride)
+        return predict_thinned(self.network, sensed, self.sensor, stride)
 
     def merged(self, predicted_m: Tensor, wrapped_m: Tensor) -> Tensor:
         """Wrapped distance with the wraps that the prediction tells, all [1, H, W] in metres."""
@@ -137,7 +137,7 @@ class ExportedSamples(Exported):
         sensed = Sensed(fractions(gray), raw, offset_lsb, noise_lsb, shift_m)
         prediction = self.look(sensed)
         predicted_m = prediction.distance_m
-        wrapped_m, valid = measured(sensed, self.sensor)
+        wrapped_m, valid = wrapped_and_valid(sensed, self.sensor)
         distance_m = self.merged(predicted_m, wrapped_m).where(valid, predicted_m)
         return {
             "predicted_m": predicted_m,

@@ -1,15 +1,15 @@
 from .autoencoder import (
     Autoencoder as Autoencoder,
     BasicBlock as BasicBlock,
-    class_depth_m as class_depth_m,
     convolution as convolution,
     doubling as doubling,
     pad as pad,
-    wrap_classes as wrap_classes,
 )
+from .input_maps import log_snr as log_snr
 from .losses import (
     LossWeights as LossWeights,
     depth_guided_loss as depth_guided_loss,
+    masked_mean as masked_mean,
     regression_loss as regression_loss,
     scale_invariant_loss as scale_invariant_loss,
     ssim_loss as ssim_loss,
@@ -17,15 +17,22 @@ from .losses import (
 from .network import (
     Needs as Needs,
     Network as Network,
-    NetworkName as NetworkName,
     Prediction as Prediction,
     Settings as Settings,
     autocast as autocast,
 )
-from .phase_maps import compressed as compressed
 from .predictor import Unwrapper as Unwrapper, load_unwrapper as load_unwrapper
-from .registry import build as build, network_class as network_class
-from .sizes import predicted as predicted
+from .registry import (
+    NetworkName as NetworkName,
+    build_network as build_network,
+    network_class as network_class,
+)
+from .sizes import predict_thinned as predict_thinned
+from .toffusionnet import true_wraps as true_wraps
 from .tofregnet import TofRegNet as TofRegNet
-from .tofsegnet import TofSegNet as TofSegNet
+from .tofsegnet import (
+    TofSegNet as TofSegNet,
+    class_depth_m as class_depth_m,
+    wrap_classes as wrap_classes,
+)
 from .weight_files import save_weights as save_weights

@@ -1,8 +1,8 @@
-"""TofRegNet and TofSegNet: a ResNet18 autoencoder from one gray image to depth or wrap class.
+"""ResNet18 autoencoder: the body of TofRegNet, TofSegNet, TofFusionNet and ChenNet, and its parts.
 
-Both share one body (`Autoencoder`): a feature-extraction stem, the four stages of a ResNet18 and a
-decoder of four transposed and four plain convolutions in sequence, with skip connections. `width`
-scales all channels; 64 gives ResNet18's own.
+A feature-extraction stem, the four stages of a ResNet18 (He et al. 2016), and a decoder of four
+transposed and four plain convolutions in sequence, with skip connections. `width` scales all
+channels; 64 gives ResNet18's own.
 """
 
 from __future__ import annotations
@@ -13,13 +13,12 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from unwrap.networks.input_maps import gray_maps
 from unwrap.networks.network import Network, Settings
 from unwrap.signal import Sensed, SensorDescription
 
 STRIDE = 32
 """The body halves the image five times; inputs are padded to a multiple of this."""
-DARKEST = 1e-3
-"""Gray level added before the logarithm, about four steps of a 12-bit converter."""
 
 
 class BasicBlock(nn.Module):
@@ -112,24 +111,16 @@ class Autoencoder(Network):
 
 
 def pad(images: Tensor) -> Tensor:
-    """Repeat the last row and column until height and width are multiples of `STRIDE`."""
+    """Repeat the last row and column until height and width are multiples of `STRIDE`.
+
+    Examples
+    --------
+    >>> pad(torch.zeros(1, 1, 30, 64)).shape
+    torch.Size([1, 1, 32, 64])
+    """
     height, width = images.shape[-2:]
     missing = (0, -width % STRIDE, 0, -height % STRIDE)
     return functional.pad(images, missing, mode="replicate") if any(missing) else images
-
-
-def describe(gray: Tensor) -> Tensor:
-    """[B, 1, H, W] -> [B, 3, H, W]: gray, its logarithm, and the row, all within [-1, 1].
-
-    The logarithm turns exposure into an offset and opens the shadows; the row tells where the
-    horizon of a camera in its usual attitude is.
-    """
-    height, width = gray.shape[-2:]
-    row = torch.linspace(-1.0, 1.0, height, device=gray.device, dtype=gray.dtype)
-    rows = row[None, None, :, None].expand(len(gray), 1, height, width)
-    logarithm = (gray + DARKEST).log() / 3.5 + 1.0
-    features = torch.cat((2.0 * gray - 1.0, logarithm, rows), 1)
-    return features.contiguous(memory_format=torch.channels_last)
 
 
 class GrayNetwork(Autoencoder):
@@ -141,32 +132,8 @@ class GrayNetwork(Autoencoder):
     def forward(self, gray: Tensor) -> Tensor:
         """gray [B, 1, H, W] in [0, 1] -> [B, outputs, H, W], for any H and W."""
         height, width = gray.shape[-2:]
-        return super().forward(describe(pad(gray)))[..., :height, :width]
+        return super().forward(gray_maps(pad(gray)))[..., :height, :width]
 
     def features(self, sensed: Sensed, sensor: SensorDescription) -> Tensor:
         """The gray image."""
         return sensed.gray.unsqueeze(1)
-
-
-IGNORED = -100
-"""Class of a pixel that cross entropy leaves out."""
-
-
-def wrap_classes(depth_m: Tensor, settings: Settings) -> Tensor:
-    """Wrap class floor(depth / unambiguous range) of each pixel, the last one for all beyond."""
-    return (depth_m / settings.unambiguous_m).long().clamp(0, settings.classes - 1)
-
-
-def class_depth_m(logits: Tensor, unambiguous_m: float) -> Tensor:
-    """Coarse distance [B, H, W] that wrap-class logits [B, classes, H, W] stand for, metres.
-
-    The expectation over the classes' middles, kept within the likeliest class: eq. 8's floor gives
-    that class, and where two classes are about as likely the distance lies at their boundary, so
-    that the nearest candidate is right on either side of it.
-    """
-    probability = logits.float().softmax(1)
-    likeliest = probability.argmax(1)
-    middles = torch.arange(logits.shape[1], device=logits.device)[:, None, None] + 0.5
-    expected = (probability * middles).sum(1)
-    # A margin of a millionth keeps rounding from leaving the class.
-    return expected.clamp(likeliest + 1e-6, likeliest + (1 - 1e-6)) * unambiguous_m

@@ -1,6 +1,6 @@
 """Losses of TofRegNet: scale invariant, structural similarity, depth guided, and their sum, eq. 7.
 
-All take prediction and truth [B, H, W] in one unit and return a scalar: the mean over the images.
+They take prediction and truth [B, H, W] in one unit and return a scalar: the mean over the images.
 Equation numbers are those of Nagiub et al., Near Field iToF LIDAR Depth Improvement from Limited
 Number of Shots (2023).
 """
@@ -16,9 +16,13 @@ EQUATION_7 = (0.5, 0.4, 0.1)
 """Weights of the scale-invariant, similarity and depth-guided terms."""
 
 
+IGNORED = -100
+"""Class of a pixel that `torch.nn.functional.cross_entropy` leaves out."""
+
+
 @dataclass(frozen=True)
 class LossWeights:
-    """How the terms of a regression loss count.
+    """How the terms of TofRegNet's loss count.
 
     Attributes
     ----------
@@ -40,6 +44,12 @@ def scale_invariant_loss(prediction: Tensor, truth: Tensor, mean_share: float = 
 
     With the paper's `mean_share` of 1 this is the variance of the error, which says nothing about
     its mean: a depth map too far by any constant costs nothing. Less than 1 ties it down.
+
+    Examples
+    --------
+    >>> truth = torch.zeros(1, 2, 2)
+    >>> scale_invariant_loss(truth + 3, truth), scale_invariant_loss(truth + 3, truth, 0.85)
+    (tensor(0.), tensor(1.3500))
     """
     difference = (truth - prediction).flatten(1)
     squares = difference.square().mean(1)
@@ -77,7 +87,10 @@ def ssim_loss(prediction: Tensor, truth: Tensor, data_range: float = 1.0) -> Ten
 
 
 def _blur(images: Tensor) -> Tensor:
-    """Gaussian window over the last two axes, without padding, as two matrix products."""
+    """Gaussian window over the last two axes, without padding.
+
+    It is separable: a matrix product along each axis.
+    """
     height, width = images.shape[-2:]
     return _windows(height, images) @ images @ _windows(width, images).T
 
@@ -114,11 +127,23 @@ def regression_loss(
     )
 
 
+def masked_mean(values: Tensor, mask: Tensor) -> Tensor:
+    """Mean of `values` where the bool `mask` of their shape holds; 0 where it holds nowhere.
+
+    Examples
+    --------
+    >>> masked_mean(torch.tensor([1.0, torch.nan, 3.0]), torch.tensor([True, False, True]))
+    tensor(2.)
+    """
+    # `where`, not a product: NaN times 0 is NaN.
+    return values.where(mask, 0.0).sum() / mask.sum().clamp(min=1)
+
+
 def wrap_loss(prediction_m: Tensor, truth_m: Tensor, unambiguous_m: float) -> Tensor:
     """Mean of |e| / h and of e^2 / (e^2 + h^2), with h half the unambiguous range; ours, not eq. 7.
 
-    The nearest-candidate merge errs where |e| > h. The second term is that step made smooth, the
-    first pulls pixels that are too far off for the second to feel.
+    The nearest-candidate merge errs where |e| > h. The second term is a smooth form of that step;
+    the first has a gradient also where the error is so large that the second is flat.
     """
     error = (prediction_m - truth_m) / (unambiguous_m / 2)
     squared = error.square()

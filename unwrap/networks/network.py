@@ -1,4 +1,4 @@
-"""What every unwrapping network is: features in, maps out, a loss to train it, a prediction."""
+"""What every unwrapping network is: input maps in, output maps out, a loss, a prediction."""
 
 from __future__ import annotations
 
@@ -13,10 +13,8 @@ from torch import Tensor, nn
 from unwrap.networks.losses import LossWeights
 from unwrap.signal import RawFrame, Sensed, SensorDescription, Truth, unambiguous_range_m
 
-NetworkName = Literal[
-    "tofregnet", "tofsegnet", "toffusionnet", "su_net", "phasenet", "agresti_net", "chen_net"
-]
 Needs = Literal["gray", "samples"]
+"""What a network looks at: the gray image alone, or the samples, too."""
 
 
 @dataclass(frozen=True)
@@ -81,8 +79,21 @@ class Settings:
 class Network(nn.Module):
     """Base of all networks.
 
-    `needs` tells what of a frame they look at; `can_be_traced`, whether their forward pass of one
-    shape is a fixed chain of operations that torch can record.
+    A frame passes a network in three steps, of which only the second has weights::
+
+        features = network.features(sensed, sensor)  # what it looks at, as maps
+        output = network(features)
+        prediction = network.predict(output, sensed, sensor)  # metres and confidence
+
+    Training puts `loss` in place of the third. A new network overrides `features`, `forward`,
+    `loss` and `predict`, and says what it looks at (`needs`).
+
+    Attributes
+    ----------
+    needs : "gray" or "samples"
+        What of a frame it looks at.
+    can_be_traced : bool
+        Whether the forward pass of one shape is a fixed chain of operations that torch can record.
     """
 
     needs: ClassVar[Needs] = "gray"
@@ -93,13 +104,13 @@ class Network(nn.Module):
         self.settings = settings
 
     @classmethod
-    @abstractmethod
-    def build(cls, settings: Settings) -> Self:
-        """An untrained network."""
+    def from_settings(cls, settings: Settings) -> Self:
+        """An untrained network; for classes whose constructor takes something else to override."""
+        return cls(settings)
 
     @abstractmethod
     def features(self, sensed: Sensed, sensor: SensorDescription) -> Tensor:
-        """What `forward` takes, float32 [B, C, H, W], of frames that the sensor delivered."""
+        """Input maps of `forward`, float32 [B, C, H, W], of frames that the sensor delivered."""
 
     def example(self, height: int, width: int) -> Tensor:
         """Features of a blank frame [1, C, H, W]."""
@@ -117,10 +128,10 @@ class Network(nn.Module):
         sensor: SensorDescription,
         weights: LossWeights,
     ) -> Tensor:
-        """Scalar to be made small, from what `forward` gave."""
+        """Scalar to be made small, from what `forward` gave; `weights` may go unused."""
 
     def calibrate(self, batches: Iterable[tuple[Sensed, Truth]], sensor: SensorDescription) -> None:
-        """Fit what turns scores into probabilities, after training; most networks have nothing."""
+        """Fit what turns scores into probabilities, after training; most have nothing to fit."""
 
     @abstractmethod
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
@@ -130,9 +141,10 @@ class Network(nn.Module):
 def autocast(device: torch.device) -> torch.autocast:
     """bfloat16 arithmetic inside the context where the device is faster with it."""
     if device.type == "cuda":
-        # Older devices emulate it, which is slower than float32.
+        # GPUs before 2020 emulate it, which is slower than float32.
         supported = torch.cuda.is_bf16_supported(including_emulation=False)
     else:
+        # Older versions of torch cannot tell; float32 is right then, if slower.
         capabilities: dict = getattr(torch.cpu, "get_capabilities", dict)()
         supported = capabilities.get("avx512_bf16", False)
     return torch.autocast(device.type, torch.bfloat16, enabled=bool(supported))

@@ -1,6 +1,7 @@
-"""A network as a program of OpenVINO, which runs on processors several times faster than torch.
+"""A network compiled by OpenVINO, which runs on processors several times faster than torch.
 
-It arranges the weights for the processor once, where torch does so for every frame.
+OpenVINO arranges the weights for the processor once, where torch does so for every frame. Only this
+module knows it: it is an optional package (the extra `fast`).
 """
 
 from __future__ import annotations
@@ -26,15 +27,18 @@ def can_compile() -> bool:
 
 @cache
 def _core() -> Any:
-    # OpenVINO tells its maker that it is used, unless the package that does so is not there.
+    """OpenVINO's runtime, one for the process."""
+    # OpenVINO reports its use to its maker through the package `openvino_telemetry`, and does
+    # without where that cannot be imported: None in `sys.modules` makes an import fail. It must be
+    # there before OpenVINO is imported. A program that has imported the package itself keeps it.
     sys.modules.setdefault("openvino_telemetry", None)  # type: ignore[arg-type]
     import openvino
 
     return openvino.Core()
 
 
-class Program:
-    """`network` compiled for features of one shape.
+class CompiledNetwork:
+    """`network` compiled for features of one shape; calls wait for each other.
 
     Parameters
     ----------
@@ -45,16 +49,18 @@ class Program:
     arithmetic : dtype
         float32 or bfloat16.
     threads : int
+        Of OpenVINO's own; torch's do not count here.
     """
 
     def __init__(self, network: nn.Module, features: Tensor, arithmetic: torch.dtype, threads: int):
-        core = _core()
+        core = _core()  # Before the import, see there.
         import openvino
 
         with warnings.catch_warnings():
             # The trace holds for this shape alone, and it is used for no other.
             warnings.simplefilter("ignore")
             model = openvino.convert_model(network, example_input=features)
+        # The conversion leaves the sizes open; this network has but one.
         model.reshape(list(features.shape))
         options = {
             "PERFORMANCE_HINT": "LATENCY",
@@ -63,6 +69,7 @@ class Program:
             # Processes side by side would be held to the same cores.
             "ENABLE_CPU_PINNING": False,
         }
+        # A request holds the memory of one computation: the lock keeps two threads from sharing it.
         self._request = core.compile_model(model, "CPU", options).create_infer_request()
         self._free = threading.Lock()
 

@@ -1,24 +1,21 @@
-"""The public face: a trained network by name or path, its predictions, and the correction."""
+"""A trained network by name or path, and its predictions."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import torch
 from torch import Tensor
 
-from unwrap.depth import Merge, correct
-from unwrap.networks.engines import Prepared, torch_threads
+from unwrap.networks.engines import Engines
 from unwrap.networks.network import Network, Prediction, multiply_accumulates
-from unwrap.networks.registry import NAMES
-from unwrap.networks.sizes import predicted, stride_to, trained_size
+from unwrap.networks.registry import PLACES
+from unwrap.networks.sizes import predict_thinned, stride_to, trained_size
 from unwrap.networks.weight_files import load_weights
 from unwrap.signal import GRAY_FULL_SCALE, Sensed, SensorDescription, unambiguous_range_m
-from unwrap.support import mapped
-
-__all__ = ["Merge", "Prediction", "SensorDescription", "Unwrapper", "correct", "load_unwrapper"]
+from unwrap.support import concatenate, mapped, torch_threads
 
 SHIPPED = Path(__file__).parents[1] / "weights"
 FRAMES_AT_ONCE = {"cpu": 1, "cuda": 64}
@@ -39,13 +36,23 @@ class Unwrapper:
         What is stored with the weights: width, frequency, size of the training frames, recipe.
     fingerprint : str
         SHA-256 of the weights; predictions may be kept under this key.
+
+    Examples
+    --------
+    >>> unwrapper = load_unwrapper("tofregnet")
+    >>> unwrapper.predict(torch.rand(2, 120, 160)).distance_m.shape
+    torch.Size([2, 120, 160])
     """
 
     name: str
     network: Network = field(repr=False)
     metadata: dict = field(repr=False)
     fingerprint: str
-    _ready: dict[torch.device, Prepared] = field(default_factory=dict, repr=False, compare=False)
+
+    @cached_property
+    def engines(self) -> Engines:
+        """What computes the predictions; part of what is done with a network, not of what it is."""
+        return Engines(self.network)
 
     @property
     def unambiguous_m(self) -> float:
@@ -73,20 +80,19 @@ class Unwrapper:
             Another shape, dtype or range, NaN, or a network that needs samples too.
         """
         if self.network.needs != "gray":
-            raise ValueError(f"{self.name} needs samples beside the gray image; use `look`")
-        with torch_threads(1):
-            sensed = Sensed(as_float(gray))
-        return self.look(sensed, SensorDescription(f1_hz=self.metadata["f1_hz"]))
+            raise ValueError(f"{self.name} needs samples, too; use `predict_sensed`")
+        with torch_threads(1):  # As in `predict_sensed`.
+            sensed = Sensed(gray_to_float(gray))
+        return self.predict_sensed(sensed, SensorDescription(f1_hz=self.metadata["f1_hz"]))
 
     @torch.inference_mode()
-    def look(self, sensed: Sensed, sensor: SensorDescription) -> Prediction:
+    def predict_sensed(self, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         """Distance from all that a sensor delivers.
 
         On a processor frames are computed one by one, so that a prediction does not depend on its
         batch; on a GPU many at once, where it may in the last bits. Frames k times as high and
         wide as the training frames are thinned as in `predict`; a network that needs samples then
-        tells only the wraps of pixels with a usable signal, which are added to each pixel's own
-        wrapped distance.
+        tells only the wraps of valid pixels, which are added to each pixel's own wrapped distance.
 
         Raises
         ------
@@ -97,20 +103,18 @@ class Unwrapper:
             raise ValueError(f"raw is None; {self.name} needs the samples of each frame")
         self.require_frequency(sensor)
         device = next(self.network.parameters()).device
-        if device not in self._ready:
-            self._ready[device] = Prepared(self.network, device)
-        # What is around the network is small; torch's threads, once awake, stay in its way.
+        engine, count = self.engines.on(device), FRAMES_AT_ONCE[device.type]
+        stride = self.stride(*sensed.gray.shape[-2:])
+
+        def predict_from(start: int) -> Prediction:
+            some = mapped(lambda tensor: tensor[start : start + count].to(device), sensed)
+            return predict_thinned(self.network, some, sensor, stride, forward=engine)
+
+        # The engine sets its own threads. What is around it is small, and torch's threads, once
+        # awake for that, would stay in the engine's way.
         with torch_threads(1):
-            return self._look(sensed, sensor, device)
-
-    def _look(self, sensed: Sensed, sensor: SensorDescription, device: torch.device) -> Prediction:
-        count = FRAMES_AT_ONCE[device.type]
-
-        def some(start: int) -> Sensed:
-            return mapped(lambda tensor: tensor[start : start + count].to(device), sensed)
-
-        parts = [self._predicted(some(start), sensor) for start in range(0, len(sensed), count)]
-        return mapped(lambda tensor: tensor.to(sensed.gray.device), joined(parts))
+            found = concatenate([predict_from(start) for start in range(0, len(sensed), count)])
+            return mapped(lambda tensor: tensor.to(sensed.gray.device), found)
 
     def require_frequency(self, sensor: SensorDescription) -> None:
         """Raise ValueError unless the network was trained for the sensor's first frequency."""
@@ -118,33 +122,22 @@ class Unwrapper:
             trained = f"{self.name} was trained for {self.metadata['f1_hz']:g}"
             raise ValueError(f"f1_hz is {sensor.f1_hz:g}; {trained}")
 
-    def _predicted(self, sensed: Sensed, sensor: SensorDescription) -> Prediction:
-        stride, ready = self.stride(*sensed.gray.shape[-2:]), self._ready[sensed.gray.device]
-        return predicted(self.network, sensed, sensor, stride, forward=ready)
-
     def macs(self, height: int, width: int) -> int:
-        """Multiply-accumulate operations of one frame of `height` x `width` pixels.
-
-        Of those pixels that the network is shown.
-        """
+        """Multiply-accumulate operations of a frame of `height` x `width` pixels, once thinned."""
         stride = self.stride(height, width)
         return multiply_accumulates(
             self.network, self.network.example(height // stride, width // stride)
         )
 
 
-def joined(parts: Sequence[Prediction]) -> Prediction:
-    """Predictions of one batch after the other."""
-    if len(parts) == 1:
-        return parts[0]
-    return Prediction(
-        torch.cat([part.distance_m for part in parts]),
-        torch.cat([part.confidence for part in parts]),
-    )
+def gray_to_float(gray: Tensor) -> Tensor:
+    """Gray images [B, H, W], uint16 in 0..4095 or float in [0, 1], checked, as float32 in [0, 1].
 
-
-def as_float(gray: Tensor) -> Tensor:
-    """[B, H, W] in [0, 1], float32, checked."""
+    Raises
+    ------
+    ValueError
+        Another shape, dtype or range, or NaN.
+    """
     if gray.ndim != 3 or 0 in gray.shape:
         raise ValueError(f"gray has shape {tuple(gray.shape)}; expected [B, H, W], not empty")
     if gray.dtype == torch.uint16:
@@ -161,7 +154,7 @@ def as_float(gray: Tensor) -> Tensor:
 
 
 def load_unwrapper(name_or_path: str | Path) -> Unwrapper:
-    """A trained network: the name of a shipped one, or the path of a safetensors file.
+    """Load a trained network: the name of a shipped one, or the path of a safetensors file.
 
     Raises
     ------
@@ -169,7 +162,7 @@ def load_unwrapper(name_or_path: str | Path) -> Unwrapper:
         The file is missing, damaged or no network of this project; the message names it and the
         cure.
     """
-    shipped = str(name_or_path) in NAMES
+    shipped = str(name_or_path) in PLACES
     path = SHIPPED / f"{name_or_path}.safetensors" if shipped else Path(name_or_path)
     weights = load_weights(path)
     network = weights.network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]

@@ -1,8 +1,8 @@
 """Frames larger than those that a network was trained on.
 
 How wide things are in pixels is part of what a network learns, so that it does badly on the same
-view with more pixels. Frames whose height and width are the same multiple of the trained ones are
-therefore thinned to them, and the prediction is brought back.
+view with more pixels. Frames whose height and width are the same multiple k of the trained ones are
+therefore thinned to every k-th row and column, and the prediction is upsampled.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from torch.nn import functional
 
 from unwrap.depth import nearest_wraps
 from unwrap.networks.network import Needs, Network, Prediction
-from unwrap.signal import Sensed, SensorDescription, measured, unambiguous_range_m
+from unwrap.signal import Sensed, SensorDescription, unambiguous_range_m, wrapped_and_valid
 from unwrap.support import mapped
 
 FIRST_SIZE = (120, 160)
@@ -44,6 +44,8 @@ def stride_to(trained: tuple[int, int], size: tuple[int, int]) -> int:
 
     1 where both are not the same whole multiple.
 
+    Examples
+    --------
     >>> stride_to((120, 160), (240, 320)), stride_to((120, 160), (240, 321))
     (2, 1)
     """
@@ -52,18 +54,24 @@ def stride_to(trained: tuple[int, int], size: tuple[int, int]) -> int:
     return stride if fits else 1
 
 
-def thinned(sensed: Sensed, stride: int) -> Sensed:
+def thin(sensed: Sensed, stride: int) -> Sensed:
     """Every `stride`-th row and column of all maps, from the first on."""
     if stride == 1:
         return sensed
     return mapped(lambda t: t[..., ::stride, ::stride] if t.ndim > 1 else t, sensed)
 
 
-def enlarged(maps: Tensor, stride: int) -> Tensor:
+def upsample(maps: Tensor, stride: int) -> Tensor:
     """Thinned maps [B, h, w] at full size [B, h stride, w stride].
 
     Linear between the rows and columns that were looked at, which keep their values; the last ones
     serve for those behind them.
+
+    Examples
+    --------
+    >>> import torch
+    >>> upsample(torch.tensor([[[1.0, 3.0]]]), 2)[0, 0]
+    tensor([1., 2., 3., 3.])
     """
     if stride == 1:
         return maps
@@ -74,28 +82,28 @@ def enlarged(maps: Tensor, stride: int) -> Tensor:
     return functional.pad(between, (0, behind, 0, behind), mode="replicate").squeeze(1)
 
 
-def restored(
+def upsample_prediction(
     prediction: Prediction, sensed: Sensed, sensor: SensorDescription, stride: int, needs: Needs
 ) -> Prediction:
     """Prediction of the thinned frames at the size of `sensed`.
 
-    Distance and confidence are `enlarged`. Networks that need samples tell the distance of each
-    pixel, so theirs gives way to the nearest wrap candidate of the pixel's own wrapped distance
-    where there is a usable signal.
+    Distance and confidence are upsampled. Networks that need samples tell the distance of each
+    pixel, which no interpolation does: where a pixel is valid, the upsampled distance only chooses
+    the nearest of its own wrap candidates.
     """
     if stride == 1:
         return prediction
-    distance_m = enlarged(prediction.distance_m, stride)
-    confidence = enlarged(prediction.confidence, stride)
+    distance_m = upsample(prediction.distance_m, stride)
+    confidence = upsample(prediction.confidence, stride)
     if needs == "samples":
-        wrapped_m, signal = measured(sensed, sensor)
+        wrapped_m, valid = wrapped_and_valid(sensed, sensor)
         unambiguous_m = unambiguous_range_m(sensor.f1_hz)
         wraps = nearest_wraps(distance_m, wrapped_m, unambiguous_m)
-        distance_m = (wrapped_m + wraps * unambiguous_m).where(signal, distance_m)
+        distance_m = (wrapped_m + wraps * unambiguous_m).where(valid, distance_m)
     return Prediction(distance_m, confidence)
 
 
-def predicted(
+def predict_thinned(
     network: Network,
     sensed: Sensed,
     sensor: SensorDescription,
@@ -103,11 +111,12 @@ def predicted(
     *,
     forward: Callable[[Tensor], Tensor] | None = None,
 ) -> Prediction:
-    """What a network makes of frames that are thinned for it, at their own size.
+    """Predict frames that are thinned for the network; the prediction has their own size.
 
-    `forward` computes what the network's own does (None), but faster: `unwrap.networks.engines.Prepared`.
+    `forward` takes the place of the network's own forward pass, as an
+    `unwrap.networks.engines.Engine` does.
     """
-    shown = thinned(sensed, stride)
+    shown = thin(sensed, stride)
     output = (forward or network)(network.features(shown, sensor))
     prediction = network.predict(output, shown, sensor)
-    return restored(prediction, sensed, sensor, stride, network.needs)
+    return upsample_prediction(prediction, sensed, sensor, stride, network.needs)

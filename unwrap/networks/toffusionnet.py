@@ -1,14 +1,16 @@
 """TofFusionNet: gray image, phase, amplitude and memory to the wrap of every pixel.
 
-What comes out is a curve over distance for each pixel: scores at knots, linear in between, the
-logarithm of a density. The pixel's own wrap candidates (wrapped distance plus whole unambiguous
-ranges) are looked up on it, so that a decision near a wrap boundary follows the phase as measured,
-noise and all; where a pixel has no usable signal the curve's mean is its distance.
+For each pixel the network gives a curve over distance, the logarithm of a density: scores at
+*knots*, two to an unambiguous range, linear in between. The pixel's own wrap candidates (wrapped
+distance plus whole unambiguous ranges) are looked up on it, and the highest wins. So a decision
+near a wrap boundary follows the phase as measured, noise and all: at a true distance of 6.3 m,
+just beyond the first wrap, a pixel whose phase says 6.2 m is in wrap 0 and one that says 0.05 m in
+wrap 1. Where a pixel has no valid signal the curve's mean is its distance.
 
-The body (`unwrap.networks.autoencoder.Autoencoder`) sees the scene at half resolution. What it finds is judged at
-full resolution by a small last stage, beside the phase and amplitude of each pixel and its
-neighbours. That stage also gives a vector for each pixel that is added to the unit vector of its
-phase: where noise is strong, the neighbours' phase outweighs the pixel's own.
+The body (`unwrap.networks.autoencoder.Autoencoder`) sees the scene at half resolution. What it
+finds goes at full resolution through a small last stage, together with the phase and amplitude of
+each pixel and its neighbours. That stage also gives a vector for each pixel that is added to the
+unit vector of its phase: where noise is strong, the neighbours' phase outweighs the pixel's own.
 """
 
 from __future__ import annotations
@@ -16,47 +18,48 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
 from unwrap.depth import fit_temperature, nearest_wraps
-from unwrap.networks.autoencoder import IGNORED, Autoencoder, convolution, describe, pad
-from unwrap.networks.losses import LossWeights
+from unwrap.networks.autoencoder import Autoencoder, convolution, pad
+from unwrap.networks.input_maps import gray_maps, memory_maps, phase_maps
+from unwrap.networks.losses import IGNORED, LossWeights, masked_mean
 from unwrap.networks.network import Needs, Prediction, Settings, autocast
-from unwrap.networks.phase_maps import phase_maps
-from unwrap.signal import Memory, Sensed, SensorDescription, Shots, Truth, measured, samples_of
+from unwrap.signal import Memory, Sensed, SensorDescription, Shots, Truth, wrapped_and_valid
 
 FEATURES = 9
-"""Maps that the network sees: three of gray, four of phase, two of memory."""
+"""Input maps: three of gray, four of phase, two of memory; see `unwrap.networks.input_maps`."""
 HIDDEN = 16
 """Maps that the body gives to each pixel, and the hidden layers' width."""
 VECTOR = 2
-"""Maps of the vector that corrects the phase."""
+"""Output maps of the vector that corrects the phase: what is added to its cosine and sine."""
 LEAST_ALONG = 0.01
 """Least component along the measured phase; its inverse bounds the gradient."""
 KNOTS_PER_WRAP = 2
+"""Knots of a curve in each unambiguous range."""
 COARSE_WEIGHT = 0.2
 """Weight of the loss of the whole curve beside that of the wrap candidates."""
 CORRECTION_WEIGHT = 0.5
-"""Weight of the mean error in metres at the right wrap, as above."""
+"""Weight of the mean error in metres at the right wrap, beside the same loss."""
 FORGOTTEN = 0.5
-"""Share of the training frames whose memory is taken away."""
-DOUBTED = 0.1
-"""Share of the blocks of remembered depth erased in training; as many are moved each way."""
+"""Share of the training frames that are shown no memory."""
+SPOILT = 0.1
+"""Share of the blocks of remembered depth that are erased in training; see `spoil_memory`."""
 BLOCKS = (6, 8)
 """Blocks down and across an image."""
 CALIBRATION_PIXELS = 200_000
-"""At most so many pixels for each number of samples."""
+"""Pixels that a batch gives at most to the fit of a temperature."""
 
 
 class TofFusionNet(Autoencoder):
-    """Scores at the knots of distance and a correction, from all that the sensor delivers.
+    """All that the sensor delivers to a curve over distance and a correction of the phase.
 
-    How many samples were taken is not among the features: a batch has one number of samples, and
-    batch normalisation would take the constant away in training and leave it in use.
+    How many samples were taken is not among the input maps: it is constant in a batch, so that
+    batch normalisation would subtract it in training, and not in use.
 
     Parameters
     ----------
@@ -71,17 +74,13 @@ class TofFusionNet(Autoencoder):
 
     def __init__(self, settings: Settings):
         super().__init__(settings, FEATURES, HIDDEN)
+        # The names of layers are those of the weight files: renaming one orphans its weights.
         self.judge = nn.Sequential(
             convolution(HIDDEN + FEATURES, HIDDEN),
             convolution(HIDDEN, HIDDEN),
             nn.Conv2d(HIDDEN, KNOTS_PER_WRAP * settings.classes + 1 + VECTOR, 1),
         )
         self.register_buffer("temperature", torch.ones(2))
-
-    @classmethod
-    def build(cls, settings: Settings) -> Self:
-        """Untrained."""
-        return cls(settings)
 
     def forward(self, features: Tensor) -> Tensor:
         """features [B, FEATURES, H, W] -> [B, knots + VECTOR, H, W], for any H and W.
@@ -94,11 +93,11 @@ class TofFusionNet(Autoencoder):
         return output.float()[..., :height, :width]
 
     def features(self, sensed: Sensed, sensor: SensorDescription) -> Tensor:
-        """Gray image, phase, amplitude, saturation, memory.
+        """Maps of gray image, phase, amplitude, saturation and memory.
 
-        In training memory is partly withheld and spoilt (`doubted`), so that the network does not
-        come to rely on it. What happens is drawn from torch's global generator, which training is
-        to seed at each step.
+        In training memory is partly withheld and spoilt (`spoil_memory`), so that the network does
+        not come to rely on it: drawn from torch's global generator, which training is to seed at
+        each step.
 
         Raises
         ------
@@ -107,9 +106,9 @@ class TofFusionNet(Autoencoder):
         """
         memory = sensed.memory
         if memory is not None and self.training:
-            memory = doubted(memory, self.settings.unambiguous_m)
+            memory = spoil_memory(memory, self.settings.unambiguous_m)
         maps = (
-            describe(sensed.gray.unsqueeze(1)),
+            gray_maps(sensed.gray.unsqueeze(1)),
             phase_maps(sensed, sensor),
             memory_maps(memory, sensed.gray, self.settings.range_m),
         )
@@ -123,25 +122,26 @@ class TofFusionNet(Autoencoder):
         sensor: SensorDescription,
         weights: LossWeights,
     ) -> Tensor:
-        """Cross entropy of the wrap candidates, that of the knots, and the corrected mean error.
+        """Cross entropy of the wrap candidates, that of the knots, and the mean error in metres.
 
-        The first and last count pixels with a usable signal, the second all of known truth, at
-        `COARSE_WEIGHT`. `weights` are those of other networks.
+        The error is that of the corrected distance in the right wrap. The first and last score
+        valid pixels, the second all of known distance.
         """
         unambiguous_m = self.settings.unambiguous_m
-        wrapped_m, signal = measured(sensed, sensor)
+        wrapped_m, valid = wrapped_and_valid(sensed, sensor)
         scores, correction_m = self.parts(output, wrapped_m)
-        wraps = own_wraps(truth.distance_m, wrapped_m, self.settings)
-        counted = truth.known & signal
+        wraps = true_wraps(truth.distance_m, wrapped_m, self.settings)
+        scored = truth.known & valid
         candidates = candidate_scores(scores, wrapped_m, unambiguous_m)
         wrap = functional.cross_entropy(
-            candidates, wraps.masked_fill(~counted, IGNORED), reduction="sum"
-        ) / counted.sum().clamp(min=1)
-        coarse = mean_over(knot_entropy(scores, truth.distance_m, unambiguous_m), truth.known)
+            candidates, wraps.masked_fill(~scored, IGNORED), reduction="sum"
+        ) / scored.sum().clamp(min=1)
+        coarse = masked_mean(knot_entropy(scores, truth.distance_m, unambiguous_m), truth.known)
         error_m = wrapped_m + wraps * unambiguous_m + correction_m - truth.distance_m
-        # Truth that is clamped is not the pixel's own.
-        exact = counted & (truth.distance_m < self.settings.range_m)
-        return wrap + COARSE_WEIGHT * coarse + CORRECTION_WEIGHT * mean_over(error_m.abs(), exact)
+        # A distance that is clamped at the range is not the pixel's own, and has no error.
+        unclamped = truth.distance_m < self.settings.range_m
+        fine = masked_mean(error_m.abs(), scored & unclamped)
+        return wrap + COARSE_WEIGHT * coarse + CORRECTION_WEIGHT * fine
 
     def parts(self, output: Tensor, wrapped_m: Tensor) -> tuple[Tensor, Tensor]:
         """Scores [B, knots, H, W] and correction [B, H, W], metres, from what `forward` gave."""
@@ -152,65 +152,73 @@ class TofFusionNet(Autoencoder):
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         """The likeliest candidate, corrected, and the probability that its wrap is right.
 
-        Pixels without a usable signal have the mean of their curve, and as confidence the
-        probability of the candidate that lies there.
+        Pixels that are not valid have the mean of their curve, and as confidence the probability of
+        the wrap that it lies in.
         """
         unambiguous_m = self.settings.unambiguous_m
-        wrapped_m, signal = measured(sensed, sensor)
+        wrapped_m, valid = wrapped_and_valid(sensed, sensor)
         scores, correction_m = self.parts(output, wrapped_m)
         coarse_m = mean_distance_m(scores, unambiguous_m)
-        place_m = torch.where(signal, wrapped_m, coarse_m.remainder(unambiguous_m))
+        place_m = torch.where(valid, wrapped_m, coarse_m.remainder(unambiguous_m))
         logits = candidate_scores(scores, place_m, unambiguous_m)
-        probability = (logits / self.temperature[_place_of(sensed)]).softmax(1)
-        wraps = torch.where(signal, probability.argmax(1), (coarse_m / unambiguous_m).long())
+        probability = (logits / self.temperature[_temperature_index(sensed)]).softmax(1)
+        wraps = torch.where(valid, probability.argmax(1), (coarse_m / unambiguous_m).long())
         confidence = probability.gather(1, wraps.unsqueeze(1)).squeeze(1)
         corrected_m = wrapped_m + wraps * unambiguous_m + correction_m
-        return Prediction(torch.where(signal, corrected_m.clamp(min=0), coarse_m), confidence)
+        return Prediction(torch.where(valid, corrected_m.clamp(min=0), coarse_m), confidence)
 
     @torch.no_grad()
     def calibrate(self, batches: Iterable[tuple[Sensed, Truth]], sensor: SensorDescription) -> None:
         """Fit `temperature` on frames that the network was not trained on.
 
-        It is the one that gives the right wraps the greatest likelihood, for 2 samples and for
-        more by themselves; where there are no frames of a kind it stays as it is. Pixels without a
-        usable signal and those of truth beyond the range are left out, and of the others every
-        batch gives at most `CALIBRATION_PIXELS`, evenly spaced.
+        It is the one that gives the right wraps the greatest likelihood, one for 2 samples and one
+        for more; where there are no frames of a kind it stays as it is. Scored are valid pixels of
+        known, unclamped distance, of which every batch gives at most about `CALIBRATION_PIXELS`,
+        evenly spaced.
         """
         found: tuple[list, list] = ([], [])
         self.eval()
         for sensed, truth in batches:
-            found[_place_of(sensed)].append(self._labelled(sensed, truth, sensor))
-        for place, pairs in enumerate(found):
+            found[_temperature_index(sensed)].append(self._scored(sensed, truth, sensor))
+        for index, pairs in enumerate(found):
             if pairs:
                 logits, wraps = (torch.cat(part) for part in zip(*pairs, strict=True))
                 if len(logits):
-                    self.temperature[place] = fit_temperature(logits, wraps)
+                    self.temperature[index] = fit_temperature(logits, wraps)
 
-    def _labelled(
+    def _scored(
         self, sensed: Sensed, truth: Truth, sensor: SensorDescription
     ) -> tuple[Tensor, Tensor]:
-        """Candidate scores [N, classes] and right wraps [N] of the pixels that tell something."""
+        """Candidate scores [N, classes] and right wraps [N] of the scored pixels."""
         with autocast(sensed.gray.device):
             output = self(self.features(sensed, sensor))
-        wrapped_m, signal = measured(sensed, sensor)
+        wrapped_m, valid = wrapped_and_valid(sensed, sensor)
         scores = output[:, :-VECTOR]
         logits = candidate_scores(scores, wrapped_m, self.settings.unambiguous_m)
-        wraps = own_wraps(truth.distance_m, wrapped_m, self.settings)
-        told = signal & truth.known & (truth.distance_m < self.settings.range_m)
-        step = max(1, int(told.sum()) // CALIBRATION_PIXELS)
-        return logits.movedim(1, -1)[told][::step], wraps[told][::step]
+        wraps = true_wraps(truth.distance_m, wrapped_m, self.settings)
+        scored = valid & truth.known & (truth.distance_m < self.settings.range_m)
+        step = max(1, int(scored.sum()) // CALIBRATION_PIXELS)
+        return logits.movedim(1, -1)[scored][::step], wraps[scored][::step]
 
 
-def _place_of(sensed: Sensed) -> int:
-    """Which temperature is for these frames."""
-    return int(samples_of(sensed).shots > Shots.TWO)
+def _temperature_index(sensed: Sensed) -> int:
+    """Which temperature is for these frames: 0 with two samples, 1 with more."""
+    return int(sensed.require_raw().shots > Shots.TWO)
 
 
 def correction_rad(vector: Tensor, phase_rad: Tensor) -> Tensor:
     """Angle [B, H, W] from the measured phase to its unit vector plus `vector` [B, 2, H, W].
 
-    Within a right angle either way: along the measured phase the sum is kept at `LEAST_ALONG` or
-    more by a softplus.
+    It is within a right angle either way, since a softplus keeps the component of the sum along the
+    measured phase at `LEAST_ALONG` or more.
+
+    Examples
+    --------
+    A vector that points straight to the left of the phase, 0, turns it by 45 degrees where it is as
+    long as the component along the phase, of whose 1 the softplus makes 1.3233.
+
+    >>> correction_rad(torch.tensor([0.0, 1.3233]).view(1, 2, 1, 1), torch.zeros(1, 1, 1))
+    tensor([[[0.7854]]])
     """
     cosine, sine = phase_rad.cos(), phase_rad.sin()
     along = LEAST_ALONG + functional.softplus(1 + cosine * vector[:, 0] + sine * vector[:, 1])
@@ -223,7 +231,7 @@ def candidate_scores(scores: Tensor, wrapped_m: Tensor, unambiguous_m: float) ->
 
     Returns [B, classes, H, W]: class n stands for the distance wrapped_m + n unambiguous_m. All
     candidates of a pixel lie equally far behind the first knot of their wrap, so that one set of
-    hat functions serves them all.
+    weights of the linear interpolation (hat functions of the knots) serves them all.
     """
     place = (wrapped_m * (KNOTS_PER_WRAP / unambiguous_m)).unsqueeze(1)
     classes = scores.shape[1] // KNOTS_PER_WRAP
@@ -234,10 +242,18 @@ def candidate_scores(scores: Tensor, wrapped_m: Tensor, unambiguous_m: float) ->
     return found
 
 
-def own_wraps(truth_m: Tensor, wrapped_m: Tensor, settings: Settings) -> Tensor:
-    """Whole wraps, int64 [B, H, W], that bring each pixel's own wrapped distance nearest to truth.
+def true_wraps(truth_m: Tensor, wrapped_m: Tensor, settings: Settings) -> Tensor:
+    """Whole wraps, int64 [B, H, W], that bring the measured wrapped distance nearest to the truth.
 
-    Not floor(truth / unambiguous range): near a boundary noise carries the phase over it.
+    Not floor(truth / unambiguous range) as `wrap_classes`: near a boundary noise carries the phase
+    over it. The last class is all beyond.
+
+    Examples
+    --------
+    Both pixels are at 6.3 m, just beyond the first wrap; noise has put the first before it.
+
+    >>> true_wraps(torch.tensor([6.3, 6.3]), torch.tensor([6.2, 0.05]), Settings(f1_hz=24e6))
+    tensor([0, 1])
     """
     wraps = nearest_wraps(truth_m, wrapped_m, settings.unambiguous_m)
     return wraps.long().clamp(max=settings.classes - 1)
@@ -257,35 +273,24 @@ def mean_distance_m(scores: Tensor, unambiguous_m: float) -> Tensor:
     apart_m, knots = unambiguous_m / KNOTS_PER_WRAP, scores.shape[1]
     knots_m = torch.arange(knots).to(scores) * apart_m
     mean_m = torch.einsum("bkhw,k->bhw", scores.softmax(1), knots_m)
-    # The end itself would be in a wrap beyond the last.
+    # The end of the last wrap itself would count as one wrap more.
     return mean_m.clamp(max=(knots - 1) * apart_m * (1 - 1e-6))
 
 
-def mean_over(values: Tensor, counted: Tensor) -> Tensor:
-    """Mean of `values` where `counted`; 0 where nothing is."""
-    return torch.where(counted, values, 0).sum() / counted.sum().clamp(min=1)
+def spoil_memory(memory: Memory, unambiguous_m: float) -> Memory:
+    """Memory as it is shown in training: nothing in some frames, and faults in the others.
 
-
-def memory_maps(memory: Memory | None, like: Tensor, range_m: float) -> Tensor:
-    """Remembered distance over the range, and where there is one: [B, 2, H, W]; zeros without."""
-    if memory is None:
-        return torch.zeros_like(like).unsqueeze(1).repeat(1, 2, 1, 1)
-    return torch.stack((memory.distance_m * (memory.known / range_m), memory.known), 1)
-
-
-def doubted(memory: Memory, unambiguous_m: float) -> Memory:
-    """Memory as it is shown in training: none of `FORGOTTEN` of the frames, blocks of others wrong.
-
-    Of the blocks (`BLOCKS` to an image) a share `DOUBTED` is erased, and as large a share is moved
-    by one unambiguous range each way, which is how a memory of wrong wraps looks.
+    A share `FORGOTTEN` of the frames has none. Of the blocks of the others (`BLOCKS` to an image) a
+    share `SPOILT` is erased, one is moved nearer by an unambiguous range and one farther, which is
+    how a memory of wrong wraps looks. Drawn from torch's global generator.
     """
     batch, height, width = memory.known.shape
     device = memory.known.device
     kept = (torch.rand(batch, 1, 1, device=device) >= FORGOTTEN).float()
     fate = torch.rand(batch, 1, *BLOCKS, device=device)
     fate = functional.interpolate(fate, (height, width), mode="nearest").squeeze(1)
-    known = memory.known * kept * (fate >= DOUBTED).float()
-    nearer = ((fate >= DOUBTED) & (fate < 2 * DOUBTED)).float()
-    farther = (fate >= 1 - DOUBTED).float()
+    known = memory.known * kept * (fate >= SPOILT).float()
+    nearer = ((fate >= SPOILT) & (fate < 2 * SPOILT)).float()
+    farther = (fate >= 1 - SPOILT).float()
     moved_m = memory.distance_m + unambiguous_m * (farther - nearer)
     return replace(memory, distance_m=moved_m.clamp(min=0) * known, known=known)

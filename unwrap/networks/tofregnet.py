@@ -1,4 +1,4 @@
-"""TODO."""
+"""TofRegNet of Nagiub et al. (2023): a gray image to coarse distance, by regression."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from typing import Self
 import torch
 from torch import Tensor
 
-from unwrap.networks.autoencoder import (
-    GrayNetwork,
-)
+from unwrap.networks.autoencoder import GrayNetwork
 from unwrap.networks.losses import LossWeights, regression_loss, wrap_loss
 from unwrap.networks.network import Prediction, Settings
 from unwrap.signal import Sensed, SensorDescription, Truth
@@ -32,8 +30,8 @@ class TofRegNet(GrayNetwork):
         super().__init__(Settings(width=width, range_m=range_m, f1_hz=f1_hz), 1)
 
     @classmethod
-    def build(cls, settings: Settings) -> Self:
-        """Untrained."""
+    def from_settings(cls, settings: Settings) -> Self:
+        """An untrained network."""
         return cls(settings.width, settings.range_m, settings.f1_hz)
 
     def forward(self, gray: Tensor) -> Tensor:
@@ -48,7 +46,7 @@ class TofRegNet(GrayNetwork):
         sensor: SensorDescription,
         weights: LossWeights,
     ) -> Tensor:
-        """Eq. 7 and our wrap loss; pixels of unknown truth count as right."""
+        """Eq. 7 and our wrap loss; pixels of unknown distance count as predicted rightly."""
         truth_m = torch.where(truth.known, truth.distance_m, output.detach())
         paper = regression_loss(
             output,
@@ -63,7 +61,7 @@ class TofRegNet(GrayNetwork):
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         """The distance; its confidence is how far it lies from a wrap boundary.
 
-        0 on a boundary, 1 halfway between two.
+        0 on a boundary, 1 halfway between two: there an error changes the wrap least easily.
         """
         cycles = output / self.settings.unambiguous_m
         return Prediction(output, cycles.sub_(cycles.round()).abs_().mul_(2))

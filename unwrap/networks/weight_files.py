@@ -19,7 +19,7 @@ from safetensors.torch import save
 from torch import Tensor, nn
 
 from unwrap.networks.network import Network, Settings
-from unwrap.networks.registry import build
+from unwrap.networks.registry import build_network
 from unwrap.networks.sizes import trained_size
 from unwrap.support import write_bytes
 
@@ -50,17 +50,18 @@ class Weights:
 
 def save_weights(path: Path, network: nn.Module, metadata: Mapping[str, Any]) -> None:
     """Write the weights of `network` and `metadata` (plain JSON values) to `path`."""
-    tensors = {name: _stored(tensor) for name, tensor in network.state_dict().items()}
+    tensors = {}
+    for name, tensor in network.state_dict().items():
+        # Kernels, which are nearly all of a file, lose nothing that matters in float16.
+        half = tensor.is_floating_point() and tensor.ndim >= 2
+        stored = tensor.detach().cpu().to(torch.float16 if half else tensor.dtype)
+        tensors[name] = stored.contiguous()
     values = {"schema": SCHEMA, "sha256": fingerprint(tensors), **metadata}
+    # The metadata of a safetensors file is text alone.
     words = {
         key: value if isinstance(value, str) else json.dumps(value) for key, value in values.items()
     }
     write_bytes(path, save(tensors, words))
-
-
-def _stored(tensor: Tensor) -> Tensor:
-    half = tensor.is_floating_point() and tensor.ndim >= 2
-    return tensor.detach().cpu().to(torch.float16 if half else tensor.dtype).contiguous()
 
 
 def fingerprint(tensors: Mapping[str, Tensor]) -> str:
@@ -98,24 +99,27 @@ def load_weights(path: Path) -> Weights:
 
 
 def _built(words: Mapping[str, str], tensors: Mapping[str, Tensor]) -> Weights:
+    """The network of a file's metadata and tensors; raises where they do not fit together."""
     if words.get("schema") != SCHEMA:
         raise ValueError(f"schema is {words.get('schema')!r}; expected {SCHEMA!r}")
     digest = fingerprint(tensors)
     if words["sha256"] != digest:
         raise ValueError("its tensors do not match its checksum")
     metadata = {key: _value(word) for key, word in words.items()}
-    trained_size(metadata)  # refused here rather than at the first frame
-    network = build(metadata["network"], Settings.of(metadata))
-    network.load_state_dict({name: tensor.to(_type_in(tensor)) for name, tensor in tensors.items()})
+    trained_size(metadata)  # Refused here rather than at the first frame.
+    network = build_network(metadata["network"], Settings.of(metadata))
+    network.load_state_dict(
+        {
+            name: tensor.to(torch.float32 if tensor.is_floating_point() else tensor.dtype)
+            for name, tensor in tensors.items()
+        }
+    )
     return Weights(network.eval(), metadata, digest)
 
 
 def _value(word: str) -> Any:
+    """JSON, or text such as a name, which `save_weights` stores as it is."""
     try:
         return json.loads(word)
     except ValueError:
         return word
-
-
-def _type_in(tensor: Tensor) -> torch.dtype:
-    return torch.float32 if tensor.is_floating_point() else tensor.dtype

@@ -197,7 +197,7 @@ def correct_recording(recording: Recording, camera: Camera) -> list[Corrected]:
         one, prediction = recording.frame(number), None
         if unwrapper is not None and one.gray is not None:
             sensed = Sensed(one.gray, one.raw, _for_batch(one.offset_lsb))
-            prediction = unwrapper.look(sensed, camera.description)
+            prediction = unwrapper.predict_sensed(sensed, camera.description)
         depth = correct(
             one.raw,
             None if prediction is None else prediction.distance_m,

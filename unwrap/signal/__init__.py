@@ -1,4 +1,7 @@
-"""What a sample is: shots, words, frames; samples to phase; wiggle; the sensor's description."""
+"""What a sample is: shots, words, frames; samples to phase; wiggle; the sensor's description.
+
+The words of the masks over pixels (`valid`, `strong`, `known`, ...) are defined in `frames.py`.
+"""
 
 import lazy_loader
 

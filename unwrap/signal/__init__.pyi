@@ -18,9 +18,8 @@ from .sensed import (
     Truth as Truth,
     first_phase as first_phase,
     is_strong as is_strong,
-    measured as measured,
-    noise_of as noise_of,
-    samples_of as samples_of,
+    sample_noise_lsb as sample_noise_lsb,
+    wrapped_and_valid as wrapped_and_valid,
     wrapped_distance_m as wrapped_distance_m,
 )
 from .shots import (
@@ -33,16 +32,19 @@ from .shots import (
 )
 from .wiggle import (
     FLAT as FLAT,
-    Straight as Straight,
+    TurnsTable as TurnsTable,
     WiggleTable as WiggleTable,
     correlation_samples as correlation_samples,
+    measure_wiggle as measure_wiggle,
     read_wiggle as read_wiggle,
     wiggle_of as wiggle_of,
-    wrapped as wrapped,
+    wrap_phase as wrap_phase,
+    write_wiggle as write_wiggle,
 )
 from .words import (
     ADC_BITS as ADC_BITS,
     GRAY_FULL_SCALE as GRAY_FULL_SCALE,
     from_words as from_words,
     mid_scale as mid_scale,
+    to_words as to_words,
 )

@@ -1,15 +1,11 @@
-"""Phase at one frequency of a frame, without what the sensor's calibration knows to be wrong."""
+"""Phase at one frequency of a frame, corrected by the calibration: offset, wiggle, drift."""
 
 from __future__ import annotations
 
+import torch
 from torch import Tensor
 
-from unwrap.signal.decoding import (
-    angle_of,
-    quadratures,
-    to_phase_,
-    to_turns_,
-)
+from unwrap.signal.decoding import quadratures, to_phase_, to_turns_
 from unwrap.signal.description import SensorDescription
 from unwrap.signal.frames import PhaseFrame, RawFrame
 from unwrap.signal.shots import SAMPLES_PER_FREQUENCY
@@ -24,10 +20,21 @@ def decode_at(
     offset_lsb: Tensor | None = None,
     shift_m: Tensor | None = None,
 ) -> PhaseFrame:
-    """Phase and amplitude of the samples at f1 (0) or f2 (1), the stored wiggle removed.
+    """Phase and amplitude of the samples at f1 (0) or f2 (1), corrected by the calibration.
 
-    `shift_m` [B] is added to the wrapped distances: minus the drift that a real sensor's
-    temperature tells; or what its compensation leaves, where samples are simulated without drift.
+    Parameters
+    ----------
+    offset_lsb : float [H, W] or [B, H, W], optional
+        Stored dark-offset map, subtracted from the samples.
+    shift_m : float [B], optional
+        Added to the wrapped distances, metres, which wrap. For a real sensor minus the drift of
+        distance at its temperature; simulated samples have no drift in them, and the shift is what
+        the compensation of the drift would leave.
+
+    Raises
+    ------
+    ValueError
+        What `decode` refuses.
     """
     cosine, sine, amplitude, residual = quadratures(samples_at(frequency, raw), offset_lsb)
     phase_rad = phase_at(frequency, cosine, sine, sensor, shift_m=shift_m)
@@ -49,9 +56,10 @@ def phase_at(
     shift_m: Tensor | None,
 ) -> Tensor:
     """Phase [B, H, W] in [0, 2 pi) of quadratures at f1 (0) or f2 (1); see `decode_at`."""
-    angle_rad = angle_of(cosine, sine)
-    straight = to_turns_ if sensor.wiggle is None else sensor.wiggle[frequency].turns_of
-    turns = straight(angle_rad)
+    angle_rad = torch.atan2(sine, cosine)
+    # Without a table the same conversion needs no look-up.
+    to_turns = to_turns_ if sensor.wiggle is None else sensor.wiggle[frequency].turns_of
+    turns = to_turns(angle_rad)
     if shift_m is not None:
         shift_turns_(turns, shift_m, (sensor.f1_hz, sensor.f2_hz)[frequency])
     return to_phase_(turns)

@@ -1,7 +1,10 @@
 """Correlation samples to phase, and phase to distance.
 
-The samples are D_k ~ m S cos(phi - k pi / 2), see `unwrap.signal.shots`; distance and phase are tied
-by phi = 4 pi f d / c (mod 2 pi).
+The samples are D_k ~ m S cos(phi - k pi / 2), see `unwrap.signal.shots`; phase and distance are
+tied by phi = 4 pi f d / c (mod 2 pi).
+
+On the way from samples to phase stand the *quadratures* m S cos(phi) and m S sin(phi), and *turns*,
+phi / (2 pi): steps that corrections of the phase reach into (`unwrap.signal.calibrated`).
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from unwrap.signal.frequencies import unambiguous_range_m
 from unwrap.support import array, array_of, can_loop, loop
 
 Array = np.ndarray
+# float32, since a Python float would make the arithmetic of a loop float64.
 HALF, ZERO = np.float32(0.5), np.float32(0.0)
 TWO_PI = 2 * math.pi
 BELOW_TWO_PI = float(np.nextafter(np.float32(TWO_PI), np.float32(0)))
@@ -24,7 +28,13 @@ BELOW_TWO_PI = float(np.nextafter(np.float32(TWO_PI), np.float32(0)))
 
 
 def distance_m(phase_rad: Tensor, frequency_hz: float) -> Tensor:
-    """Wrapped distance of a phase: d = c phi / (4 pi f)."""
+    """Wrapped distance of a phase: d = c phi / (4 pi f).
+
+    Examples
+    --------
+    >>> distance_m(torch.tensor([0.0, torch.pi]), 24e6)
+    tensor([0.0000, 3.1228])
+    """
     return phase_rad * (unambiguous_range_m(frequency_hz) / TWO_PI)
 
 
@@ -45,9 +55,17 @@ def decode(dcs: Tensor, *, offset_lsb: Tensor | None = None) -> PhaseFrame:
     ------
     ValueError
         Another number of samples, another dtype, or a NaN or infinity; the message says where.
+
+    Examples
+    --------
+    Four samples of one pixel at 90 degrees, with an offset of 5 that cancels:
+
+    >>> frame = decode(torch.tensor([5.0, 105.0, 5.0, -95.0]).view(4, 1, 1))
+    >>> frame.phase_rad, frame.amplitude
+    (tensor([[1.5708]]), tensor([[100.]]))
     """
     cosine, sine, amplitude, residual = quadratures(dcs, offset_lsb)
-    phase_rad = to_phase_(to_turns_(angle_of(cosine, sine)))
+    phase_rad = to_phase_(to_turns_(torch.atan2(sine, cosine)))
     return PhaseFrame(phase_rad, amplitude, residual)
 
 
@@ -56,10 +74,13 @@ def quadratures(
 ) -> tuple[Tensor, Tensor, Tensor, Tensor | None]:
     """Cosine, sine, amplitude and residual, see `decode`, which says what is refused.
 
-    Written twice: a compiled loop where samples lie in memory, a chain of torch operations for
+    Written twice: a compiled loop for samples on the processor, a chain of torch operations for
     other devices, gradients and exported files. A test holds them together.
     """
-    _check_kind(dcs)
+    if not dcs.is_floating_point():
+        raise ValueError(f"dcs is {dcs.dtype}; expected a floating-point tensor")
+    if dcs.ndim < 3 or dcs.shape[-3] not in (2, 4):
+        raise ValueError(f"dcs has shape {tuple(dcs.shape)}; expected [..., 2 or 4, H, W]")
     return _by_loop(dcs, offset_lsb) if can_loop(dcs) else _by_torch(dcs, offset_lsb)
 
 
@@ -78,7 +99,7 @@ def _by_torch(
 
 
 def _length(cosine: Tensor, sine: Tensor) -> Tensor:
-    """As `torch.hypot`, which files of networks do not know."""
+    """As `torch.hypot`, which ONNX has no operation for."""
     return (cosine * cosine).addcmul(sine, sine).sqrt()
 
 
@@ -90,7 +111,8 @@ def _by_loop(
     offset = array_of(0.0 if offset_lsb is None else offset_lsb, shape)
     maps = np.empty((4, len(samples), height, width), np.float32)
     if not decode_pixels(array(samples), offset.reshape(maps[0].shape), *maps):
-        _check_values(dcs)  # Which sample it was is only looked for where there is one.
+        # The loop only tells that some sample is not finite; the error says which.
+        _check_values(dcs)
     cosine, sine, amplitude, residual = torch.from_numpy(maps).view(4, *shape).unbind()
     return cosine, sine, amplitude, residual if count == 4 else None
 
@@ -119,39 +141,31 @@ def decode_pixels(
                 squared = x * x + y * y
                 cosine[b, i, j], sine[b, i, j] = x, y
                 amplitude[b, i, j] = np.sqrt(squared) * scale
+                # x - x is 0 but for NaN and infinity; a branch would keep the loop from vector
+                # instructions.
                 finite = finite & (squared - squared == ZERO)
     return finite
 
 
-def angle_of(cosine: Tensor, sine: Tensor) -> Tensor:
-    """Phase in [-pi, pi]."""
-    return torch.atan2(sine, cosine)
-
-
 def to_turns_(phase_rad: Tensor) -> Tensor:
-    """Phases in [-pi, 2 pi) become turns in place, one more than they are, so none is negative."""
+    """Phases in [-pi, 2 pi) become phi / (2 pi) + 1, in place.
+
+    The added turn keeps them from being negative; `to_phase_` takes whole turns away.
+    """
     return phase_rad.mul_(1 / TWO_PI).add_(1)
 
 
 def to_phase_(turns: Tensor) -> Tensor:
-    """Turns that are not negative become their phase in [0, 2 pi), in place.
-
-    The largest float below one, times 2 pi, rounds to one below 2 pi.
-    """
+    """Turns that are not negative become their phase in [0, 2 pi), in place."""
+    # The largest float below 1, times 2 pi, rounds to a float below 2 pi: the interval stays open.
     return turns.frac_().mul_(TWO_PI)
-
-
-def _check_kind(dcs: Tensor) -> None:
-    if not dcs.is_floating_point():
-        raise ValueError(f"dcs is {dcs.dtype}; expected a floating-point tensor")
-    if dcs.ndim < 3 or dcs.shape[-3] not in (2, 4):
-        raise ValueError(f"dcs has shape {tuple(dcs.shape)}; expected [..., 2 or 4, H, W]")
 
 
 def _check_values(dcs: Tensor) -> None:
     if torch.compiler.is_compiling():
         return  # A graph, such as an exported one, is made before there are values.
-    # A sum is one pass and is finite unless a sample is not (or samples are absurdly large).
+    # A sum is one pass, and finite unless a sample is not; or samples are so large that it
+    # overflows, and then the search below finds none.
     if not math.isfinite(dcs.sum()):
         for name, wrong in (("NaN", dcs.isnan()), ("an infinity", dcs.isinf())):
             if wrong.any():

@@ -1,4 +1,14 @@
-"""The values that pass between sensor, decoder and unwrapper: frozen, batch first."""
+"""The values that pass between sensor, decoder and unwrapper: frozen, batch first.
+
+Masks over pixels are bool [B, H, W], and each word for one means the same everywhere:
+
+saturated : a tap was full or the converter overflowed in any sample.
+strong : amplitude over noise reaches `SensorDescription.min_snr`.
+valid : strong and not saturated, and what else a method asks for; the distance may be used.
+known : the true, or the remembered, distance of the pixel is known.
+unclamped : the true distance is the pixel's own, and not the largest that a network predicts.
+scored : pixels that an error, a loss or a score counts, as its docstring says.
+"""
 
 from __future__ import annotations
 
@@ -59,8 +69,8 @@ class DepthFrame:
     Attributes
     ----------
     distance_m : float32 [B, H, W]
-        Radial distance in metres; where `valid` is false it is the best guess there is
-        (the network's prediction) or NaN where there is none.
+        Radial distance in metres; where not `valid` the best guess there is (the network's
+        prediction), or NaN where there is none.
     valid : bool [B, H, W]
         Signal strong enough, not saturated, frequencies agree.
     phase_rad : float32 [B, H, W]
@@ -87,5 +97,5 @@ class DepthFrame:
 
     @property
     def wraps(self) -> Tensor:
-        """Whole unambiguous ranges at f1 in `distance_m`, int64 [B, H, W]; 0 where it is NaN."""
+        """Whole unambiguous ranges at f1 in `distance_m`, int64 [B, H, W]; 0 where that is NaN."""
         return self.distance_m.mul(1 / self.unambiguous_m).nan_to_num_().long()

@@ -1,4 +1,7 @@
-"""What two modulation frequencies can tell apart: ranges before the phases repeat. Plain Python."""
+"""Unambiguous ranges of one and of two modulation frequencies, and how near candidates come.
+
+Plain Python without torch, since the sensor's configuration is checked with it.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ import math
 
 SPEED_OF_LIGHT_M_S = 299_792_458.0
 GRID_HZ = 1000
-"""Frequencies are compared on this grid; oscillators are no more exact than that."""
+"""Grid on which frequencies have a greatest common divisor; oscillators are no more exact."""
 
 
 def unambiguous_range_m(frequency_hz: float) -> float:
@@ -34,10 +37,10 @@ def joint_range_m(f1_hz: float, f2_hz: float) -> float:
 
 
 def candidate_spacing_m(f1_hz: float, f2_hz: float, max_range_m: float) -> float:
-    """Smallest difference of the disagreements of two wrap candidates of f1 within a range.
+    """How near two wrap candidates of f1 within a range come to each other at f2, metres.
 
-    Candidate n of f1 lies n d_u1 further, which is n d_u1 mod d_u2 at f2. Two frequencies tell
-    neighbouring candidates apart while they disagree by less than half of this distance.
+    Candidate n of f1 lies n d_u1 further, which is n d_u1 mod d_u2 at f2. The right candidate is
+    found while noise makes the two frequencies disagree by less than half of this spacing.
 
     Examples
     --------
@@ -49,5 +52,6 @@ def candidate_spacing_m(f1_hz: float, f2_hz: float, max_range_m: float) -> float
     range1_m, range2_m = unambiguous_range_m(f1_hz), unambiguous_range_m(f2_hz)
     wraps = range(math.floor(max_range_m / range1_m) + 1)
     places = sorted(n * range1_m / range2_m % 1.0 for n in wraps)
+    # The first place comes again a whole turn later.
     gaps = (b - a for a, b in itertools.pairwise([*places, places[0] + 1.0]))
     return range2_m * min(gaps)

@@ -1,4 +1,7 @@
-"""Frames as networks see them: what the sensor delivers, and the truth to learn from."""
+"""Frames as networks see them: what the sensor delivers, and the truth to learn from.
+
+For the words of the masks (`valid`, `known`, ...) see `unwrap.signal.frames`.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ class Memory:
     distance_m : float32 [B, H, W]
         Metres; 0 where nothing is remembered.
     known : float32 [B, H, W]
-        1 where something is remembered, else 0.
+        1 where something is remembered, else 0: a number, since it is a map that networks see.
     """
 
     distance_m: Tensor
@@ -43,7 +46,7 @@ class Sensed:
     noise_lsb : float32 [B, H, W] or None
         Standard deviation of one sample, estimated by the sensor.
     shift_m : float64 [B] or None
-        See `unwrap.signal.calibrated.decode_at`.
+        Added to the wrapped distances, see `unwrap.signal.calibrated.decode_at`.
     memory : Memory or None
         Of the frame before.
     """
@@ -58,6 +61,18 @@ class Sensed:
     def __len__(self) -> int:
         """Number of frames."""
         return len(self.gray)
+
+    def require_raw(self) -> RawFrame:
+        """The samples.
+
+        Raises
+        ------
+        ValueError
+            There are none.
+        """
+        if self.raw is None:
+            raise ValueError("sensed.raw is None; expected 2, 4 or 8 samples")
+        return self.raw
 
 
 @dataclass(frozen=True)
@@ -76,23 +91,11 @@ class Truth:
     known: Tensor
 
 
-def samples_of(sensed: Sensed) -> RawFrame:
-    """The samples that the sensor delivered.
-
-    Raises
-    ------
-    ValueError
-        There are none.
-    """
-    if sensed.raw is None:
-        raise ValueError("sensed.raw is None; expected 2, 4 or 8 samples")
-    return sensed.raw
-
-
 def first_phase(sensed: Sensed, sensor: SensorDescription) -> PhaseFrame:
-    """Phase [B, H, W] at f1, with the offset, the wiggle and the shift removed that are known."""
-    raw, shift_m = samples_of(sensed), sensed.shift_m
-    return decode_at(0, raw, sensor, offset_lsb=sensed.offset_lsb, shift_m=shift_m)
+    """Phase and amplitude [B, H, W] at f1, corrected by offset, wiggle and shift."""
+    return decode_at(
+        0, sensed.require_raw(), sensor, offset_lsb=sensed.offset_lsb, shift_m=sensed.shift_m
+    )
 
 
 def wrapped_distance_m(sensed: Sensed, sensor: SensorDescription) -> Tensor:
@@ -100,21 +103,28 @@ def wrapped_distance_m(sensed: Sensed, sensor: SensorDescription) -> Tensor:
     return distance_m(first_phase(sensed, sensor).phase_rad, sensor.f1_hz)
 
 
-def noise_of(sensed: Sensed, sensor: SensorDescription) -> Tensor | float:
+def sample_noise_lsb(sensed: Sensed, sensor: SensorDescription) -> Tensor | float:
     """Standard deviation of one sample, LSB: the sensor's estimate, else its noise in the dark."""
     return sensor.noise_lsb if sensed.noise_lsb is None else sensed.noise_lsb
 
 
 def is_strong(amplitude: Tensor, noise_lsb: Tensor | float, sensor: SensorDescription) -> Tensor:
-    """Where amplitude over the noise of one sample reaches `min_snr`, bool."""
+    """Where amplitude over the noise of one sample reaches `min_snr`, bool.
+
+    Examples
+    --------
+    >>> import torch
+    >>> is_strong(torch.tensor([2.9, 3.0]), 1.0, SensorDescription(min_snr=3.0))
+    tensor([False,  True])
+    """
     return amplitude >= noise_lsb * sensor.min_snr
 
 
-def measured(sensed: Sensed, sensor: SensorDescription) -> tuple[Tensor, Tensor]:
-    """Wrapped distance [B, H, W] in metres, and where it is usable, bool.
+def wrapped_and_valid(sensed: Sensed, sensor: SensorDescription) -> tuple[Tensor, Tensor]:
+    """Wrapped distance [B, H, W] in metres, and where it is valid, bool.
 
-    Usable is what has signal enough and is not saturated, as in `unwrap.correct`.
+    Valid is what is strong and not saturated, as with two and four samples in `unwrap.correct`.
     """
     frame = first_phase(sensed, sensor)
-    strong = is_strong(frame.amplitude, noise_of(sensed, sensor), sensor)
-    return distance_m(frame.phase_rad, sensor.f1_hz), strong & ~samples_of(sensed).saturated
+    strong = is_strong(frame.amplitude, sample_noise_lsb(sensed, sensor), sensor)
+    return distance_m(frame.phase_rad, sensor.f1_hz), strong & ~sensed.require_raw().saturated

@@ -1,13 +1,14 @@
 """Which samples an acquisition takes: how many, at which frequency, in which order, when.
 
-This module and `unwrap.signal.decoding` are the only places that know the conventions of
-the samples. `D_k ~ m S cos(phi - k pi/2)`, k = 0..3, first at f1, then at f2, so
-that the 2- and 4-DCS acquisitions are prefixes of the 8-DCS one.
+Sample k of 0..7 is D_k ~ m S cos(phi - k pi / 2), with the signal S and the demodulation contrast
+m: 0..3 are taken at f1, 4..7 at f2, so that acquisitions of 2 and 4 DCS are prefixes of that of 8.
+Only this module and `unwrap.signal.decoding` know these conventions.
 """
 
 from __future__ import annotations
 
 import enum
+import math
 
 SAMPLES_PER_FREQUENCY = 4
 
@@ -27,7 +28,7 @@ class Shots(enum.IntEnum):
 
 def demodulation_phase_rad(sample: int) -> float:
     """Phase theta_k of the demodulation signal of sample `sample` (0..7), in radians."""
-    return (sample % SAMPLES_PER_FREQUENCY) * 1.5707963267948966
+    return (sample % SAMPLES_PER_FREQUENCY) * (math.pi / 2)
 
 
 def frequency_index(sample: int) -> int:
@@ -39,6 +40,11 @@ def sample_times_s(shots: int, sample_period_s: float) -> tuple[float, ...]:
     """Start of each sample after the start of the frame, in seconds: t_k = k * period.
 
     `sample_period_s` is integration time plus readout time.
+
+    Examples
+    --------
+    >>> sample_times_s(Shots.FOUR, 0.25)
+    (0.0, 0.25, 0.5, 0.75)
     """
     return tuple(k * sample_period_s for k in range(int(shots)))
 

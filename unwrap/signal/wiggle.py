@@ -1,7 +1,7 @@
-"""Calibration of the wiggle: a table of the phase error, measured at known distances.
+"""Wiggle: the phase error of square light and demodulation, and the stored table that removes it.
 
-Square light and demodulation correlate to a triangle; its odd harmonics bend the decoded phase
-four times per period, by at most 0.0711 rad. Two and four samples bend alike, so that one table per
+Square light and demodulation correlate to a triangle; its odd harmonics bend the decoded phase four
+times per period, by at most 0.0711 rad. Two and four samples bend alike, so that one table per
 modulation frequency serves both.
 """
 
@@ -34,15 +34,16 @@ BINS = 256
 LARGEST_FILE_BYTES = 2**20
 
 
-class Straight(NamedTuple):
-    """How an angle becomes turns without the stored phase error, float32; see `WiggleTable`.
+class TurnsTable(NamedTuple):
+    """What `WiggleTable.turns_of` looks up, for compiled loops: float32, since they compute in it.
+
+    An angle lies at the place x = first + bins_per_rad angle, in bins; its turns are
+    constant[i] + slope[i] x with i = floor(x).
 
     Attributes
     ----------
-    constant, slope : [n]
-        Turns at the place x of an angle in bins: constant + slope x, in the bin that holds x.
-    first, bins_per_rad
-        The place of an angle: first + bins_per_rad angle.
+    constant, slope : float32 [n]
+    first, bins_per_rad : float32
     """
 
     constant: np.ndarray
@@ -76,14 +77,19 @@ class WiggleTable:
 
     @cached_property
     def _first(self) -> Tensor:
-        """Bins from the first line, at a phase of -pi or just below it, to phase 0."""
+        """Whole bins from the first line, whose phase is -pi or just below it, to phase 0.
+
+        A tensor, since `torch.add` takes no number in its place.
+        """
         return torch.tensor((len(self.error_rad) + 1) // 2)
 
     @cached_property
     def _lines(self) -> Tensor:
-        """What `turns_of` gives, a + b x at the place x of a phase in bins: [2, bins] of a and b.
+        """Lines a + b x of `turns_of` over the place x of a phase in bins: [2, lines] of a and b.
 
-        From -pi to 2 pi and a bin beyond, which is that of phases that round up.
+        One for each bin from -pi to 2 pi, so that angles in [-pi, pi] and phases in [0, 2 pi) need
+        no wrapping first; and one bin beyond, for phases that round up. In float64 until the end:
+        a is a difference of larger numbers.
         """
         count, first = len(self.error_rad), int(self._first)
         place = torch.arange(first + count + 2, dtype=torch.float64)
@@ -94,21 +100,33 @@ class WiggleTable:
         return torch.stack((turns[:-1] - slopes * place[:-1], slopes))
 
     @cached_property
-    def straight(self) -> Straight:
+    def turns_table(self) -> TurnsTable:
         """The same lines for the compiled loops."""
         constant, slope = self._lines.to(torch.float32).numpy()
         bins_per_rad = np.float32(len(self.error_rad) / TWO_PI)
-        return Straight(constant, slope, np.float32(int(self._first)), bins_per_rad)
+        return TurnsTable(constant, slope, np.float32(int(self._first)), bins_per_rad)
 
     def turns_of(self, phase_rad: Tensor) -> Tensor:
-        """Phases in [-pi, 2 pi) as turns without their error, one more, so none is negative."""
+        """Phases in [-pi, 2 pi) without their error, as turns plus 1; see `to_turns_`.
+
+        `unwrap.depth.merge.merge_pixels` does the same by `turns_table`; a test holds the two
+        together.
+        """
         first, lines = self._first.to(phase_rad), self._lines.to(phase_rad)
         place = torch.add(first, phase_rad, alpha=len(self.error_rad) / TWO_PI).flatten()
+        # Places are not negative, so that the conversion, which cuts off, is the floor.
         constant, slope = lines.index_select(1, place.to(torch.int32)).unbind(0)
         return torch.addcmul(constant, slope, place).view(phase_rad.shape)
 
     def corrected(self, frame: PhaseFrame) -> PhaseFrame:
-        """`frame` with the phase error removed."""
+        """`frame` with the phase error removed.
+
+        Examples
+        --------
+        >>> table = WiggleTable((0.25,) * 4)
+        >>> table.corrected(PhaseFrame(torch.tensor([1.0]), torch.tensor([9.0]), None)).phase_rad
+        tensor([0.7500])
+        """
         return replace(frame, phase_rad=to_phase_(self.turns_of(frame.phase_rad)))
 
 
@@ -119,29 +137,38 @@ FLAT = WiggleTable((0.0,) * 4)
 def shifted(frame: PhaseFrame, shift_m: Tensor, frequency_hz: float) -> PhaseFrame:
     """`frame` [B, H, W] with `shift_m` [B] added to its distances, which wrap.
 
-    What a delay does to the samples of a sine, 4 pi f shift / c on the phase.
+    On the phase that is 4 pi f shift / c, as a delay of the light has it.
     """
     turns = shift_turns_(to_turns_(frame.phase_rad.clone()), shift_m, frequency_hz)
     return replace(frame, phase_rad=to_phase_(turns))
 
 
 def shift_turns_(turns: Tensor, shift_m: Tensor, frequency_hz: float) -> Tensor:
-    """Turns [B, H, W] are advanced, in place, by distances `shift_m` [B], up to whole turns."""
+    """Add the distances `shift_m` [B] to turns [B, H, W], in place, up to whole turns."""
     range_m = unambiguous_range_m(frequency_hz)
+    # The remainder is taken in the shift's own type, float64, and is not negative: turns must not
+    # become so.
     return turns.add_(shift_m.remainder(range_m).to(turns).view(-1, 1, 1), alpha=1 / range_m)
 
 
-def wrapped(phase_rad: Tensor) -> Tensor:
-    """Phase in [0, 2 pi); the clamp catches what adding 2 pi rounds up."""
+def wrap_phase(phase_rad: Tensor) -> Tensor:
+    """Any phase wrapped to [0, 2 pi).
+
+    Examples
+    --------
+    >>> wrap_phase(torch.tensor([-torch.pi / 2, 7.0]))
+    tensor([4.7124, 0.7168])
+    """
     turns = phase_rad.mul(1 / TWO_PI).floor_()
+    # The clamp catches tiny negative phases, to which adding 2 pi gives 2 pi itself.
     return phase_rad.add(turns, alpha=-TWO_PI).clamp_(0.0, BELOW_TWO_PI)
 
 
 def measure_wiggle(decoded_rad: Tensor, true_rad: Tensor, *, bins: int = BINS) -> WiggleTable:
     """Table from a calibration bench: phases decoded at known distances over one period.
 
-    The periodic, piecewise linear curve that fits the errors best in the sense of least squares,
-    so that noise averages out. A constant error, the sensor's own delay, is part of the table.
+    A least-squares fit of a periodic, piecewise linear curve to the errors, in which noise averages
+    out. A constant error, the sensor's own delay, is part of the table.
 
     Parameters
     ----------
@@ -164,8 +191,15 @@ def measure_wiggle(decoded_rad: Tensor, true_rad: Tensor, *, bins: int = BINS) -
         raise ValueError("decoded_rad or true_rad holds NaN or infinity")
     place = torch.remainder(decoded, TWO_PI) * (bins / TWO_PI)
     left = place.long().remainder(bins)
-    _require_every_bin(left, bins)
-    # Normal equations of the hat functions: each measurement touches its two neighbours.
+    empty = (torch.bincount(left, minlength=bins) == 0).nonzero().flatten().tolist()
+    if empty:
+        degrees = 360 / bins
+        raise ValueError(
+            f"{len(empty)} of {bins} bins hold no measurement, the first from "
+            f"{empty[0] * degrees:.1f} to {(empty[0] + 1) * degrees:.1f} degrees; measure there or "
+            "take fewer bins"
+        )
+    # Normal equations of the hat functions: each measurement touches the two entries beside it.
     right, share = (left + 1) % bins, place - place.floor()
     sides = ((left, 1.0 - share), (right, share))
     matrix, target = torch.zeros(bins * bins).double(), torch.zeros(bins).double()
@@ -175,17 +209,6 @@ def measure_wiggle(decoded_rad: Tensor, true_rad: Tensor, *, bins: int = BINS) -
             matrix.index_add_(0, row * bins + column, weight * other)
     solution = torch.linalg.solve(matrix.view(bins, bins), target)
     return WiggleTable(tuple(solution.tolist()))
-
-
-def _require_every_bin(index: Tensor, bins: int) -> None:
-    empty = (torch.bincount(index, minlength=bins) == 0).nonzero().flatten().tolist()
-    if empty:
-        degrees = 360 / bins
-        raise ValueError(
-            f"{len(empty)} of {bins} bins hold no measurement, the first from "
-            f"{empty[0] * degrees:.1f} to {(empty[0] + 1) * degrees:.1f} degrees; measure there or "
-            "take fewer bins"
-        )
 
 
 def correlation_samples(phase_rad: Tensor, weights: Sequence[tuple[int, float]]) -> Tensor:
@@ -198,7 +221,15 @@ def correlation_samples(phase_rad: Tensor, weights: Sequence[tuple[int, float]])
 
 
 def wiggle_of(weights: Sequence[tuple[int, float]], *, bins: int = BINS) -> WiggleTable:
-    """Table that a noise-free bench would measure of a correlation with these harmonics."""
+    """Table that a noise-free bench would measure of a correlation with these harmonics.
+
+    Examples
+    --------
+    >>> from unwrap.signal.shots import harmonic_weights
+    >>> errors = wiggle_of(harmonic_weights(1.0, 501)).error_rad
+    >>> round(max(errors), 4)
+    0.0711
+    """
     true_rad = torch.arange(32 * bins, dtype=torch.float64) * (TWO_PI / (32 * bins))
     samples = correlation_samples(true_rad, weights)
     return measure_wiggle(decode(samples.unsqueeze(-2)).phase_rad[0], true_rad, bins=bins)
@@ -222,10 +253,10 @@ def read_wiggle(path: Path) -> dict[float, WiggleTable]:
         if path.stat().st_size > LARGEST_FILE_BYTES:
             raise ValueError(f"larger than {LARGEST_FILE_BYTES} bytes")
         rows = json.loads(path.read_text(encoding="utf-8"))["wiggle"]
-        return {float(row["frequency_hz"]): _table(row["error_rad"]) for row in rows}
+        return {
+            float(row["frequency_hz"]): WiggleTable(tuple(map(float, row["error_rad"])))
+            for row in rows
+        }
+    # JSON of the wrong shape fails as any of these; nested too deep, as the last.
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise ValueError(f"{path} is no wiggle table: {error!r}") from None
-
-
-def _table(values: Sequence[float]) -> WiggleTable:
-    return WiggleTable(tuple(float(value) for value in values))

@@ -1,4 +1,4 @@
-"""Tools that know nothing of light: files written whole, loops compiled, tensors, sections, progress."""
+"""Tools that know nothing of light: whole files, compiled loops, tensors, threads, progress."""
 
 import lazy_loader
 

@@ -6,6 +6,10 @@ from .compiled import (
     loop as loop,
 )
 from .files import write_bytes as write_bytes, write_json as write_json, write_text as write_text
+from .process_state import (
+    keep_freed_memory as keep_freed_memory,
+    torch_threads as torch_threads,
+)
 from .progress_bar import progress as progress, say as say
 from .section import (
     Fraction as Fraction,

@@ -1,8 +1,9 @@
-"""Loops over pixels, compiled.
+"""Loops over pixels, compiled by Numba.
 
-A chain of array operations walks through memory once for each; a loop that Numba compiles does the
-whole chain in one walk, several times faster. Arithmetic keeps to the rules of IEEE 754, in the
-order in which it is written: every processor gives the same numbers to the last bit.
+A chain of array operations reads and writes memory once for each operation; a compiled loop does
+the whole chain in one pass, several times faster. Arithmetic keeps to the rules of IEEE 754, in the
+order in which it is written (no `fastmath`): every processor gives the same numbers to the last
+bit.
 """
 
 from __future__ import annotations
@@ -21,21 +22,33 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def loop(function: Function) -> Function:
-    """`function` compiled at its first call, and kept on disk for the next process.
+    """`function` compiled at its first call; the machine code is kept on disk for later processes.
 
-    It runs on one thread without Python's lock. Beside arrays it should be given float32 numbers: a
-    Python float would make the arithmetic float64. What it calls must stand in the same file, or
-    changes there would not be noticed.
+    It runs on one thread, without Python's lock. Numbers beside the arrays should be `np.float32`:
+    a Python float would make the arithmetic float64. Functions that it calls must stand in the same
+    file: Numba compiles anew when that file changes, and does not look at others.
+
+    Examples
+    --------
+    >>> @loop
+    ... def add_(values, number):
+    ...     for i in range(len(values)):
+    ...         values[i] += number
+    >>> values = np.zeros(3, np.float32)
+    >>> add_(values, np.float32(2))
+    >>> values
+    array([2., 2., 2.], dtype=float32)
     """
+    # With Python's error model a division by zero raises, and every division is preceded by a test.
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
     try:
         return numba.njit(cache=True, **options)(function)
-    except RuntimeError:  # There is no folder to keep it in.
+    except RuntimeError:  # No folder can be written to: installed read-only, without a home.
         return numba.njit(**options)(function)
 
 
 def inlined(function: Function) -> Function:
-    """`function` of numbers, which compiled loops may call as well."""
+    """`function` of numbers, which Python calls as it is and compiled loops inline."""
     return register_jitable(inline="always")(function)
 
 
@@ -45,15 +58,26 @@ def array(tensor: Tensor, dtype: type | None = np.float32) -> np.ndarray:
 
 
 def array_of(value: Tensor | float, shape: Sequence[int]) -> np.ndarray:
-    """A number, or a map that is common to several frames, as float32 of each pixel."""
+    """A number, or a map that is common to several frames, as a float32 array of `shape`.
+
+    Examples
+    --------
+    >>> array_of(1.5, (2, 2))
+    array([[1.5, 1.5],
+           [1.5, 1.5]], dtype=float32)
+    """
     if isinstance(value, (int, float, np.number)):
         return np.full(shape, value, np.float32)
     return array(value if value.shape == shape else value.expand(shape))
 
 
 def can_loop(*tensors: Tensor) -> bool:
-    """Whether loops may work on `tensors`: float32 in memory, without gradients or a tracer."""
-    import torch
+    """Whether loops may work on `tensors`: float32 on the processor, without gradients.
+
+    False, too, while torch records a graph (compilation, tracing for ONNX or OpenVINO), in which a
+    loop would leave no trace.
+    """
+    import torch  # Not at the top: see above.
 
     if torch.compiler.is_compiling() or torch.jit.is_tracing():
         return False

@@ -18,15 +18,17 @@ def write_bytes(path: Path, content: bytes) -> None:
         No space or no permission; nothing was overwritten.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
+    # In the same folder: a file can only be renamed within its file system.
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
             file.flush()
+            # Without this a crash soon after the rename could leave an empty file under `path`.
             os.fsync(file.fileno())
-        Path(name).chmod(0o644)
+        Path(name).chmod(0o644)  # mkstemp makes files that only their owner may read.
         Path(name).replace(path)
-    except BaseException:
+    except BaseException:  # Ctrl-C, too, must leave nothing lying about.
         Path(name).unlink(missing_ok=True)
         raise
 

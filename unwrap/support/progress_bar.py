@@ -17,6 +17,7 @@ class _Lines:
         self._stream = stream
 
     def write(self, text: str) -> None:
+        # tqdm goes back to the start of the line with "\r", which a log file would keep.
         line = text.strip("\r\n")
         if line.strip():
             self._stream.write(line + "\n")

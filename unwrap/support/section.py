@@ -1,4 +1,4 @@
-"""What every section of the configuration is made of."""
+"""Sections of the configuration: their base class, and types of bounded numbers."""
 
 from __future__ import annotations
 
@@ -7,13 +7,25 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 Range = tuple[float, float]
+"""(low, high), see `check_range`."""
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
 class Section(BaseModel):
-    """Base of every section: frozen, and unknown keys are refused."""
+    """Base of every section: frozen, and unknown keys are refused.
+
+    Examples
+    --------
+    >>> class Lens(Section):
+    ...     f_number: Positive = 1.4
+    >>> Lens(f_numbre=2)
+    Traceback (most recent call last):
+    ...
+    pydantic_core._pydantic_core.ValidationError: 1 validation error for Lens
+    ...
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -21,5 +33,6 @@ class Section(BaseModel):
 def check_range(name: str, bounds: Range) -> None:
     """Raise ValueError unless `bounds` is (low, high) with low <= high."""
     low, high = bounds
+    # Not `low > high`, which is false for NaN.
     if not low <= high:
         raise ValueError(f"{name} is ({low:g}, {high:g}); expected low <= high")

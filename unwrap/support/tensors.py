@@ -16,6 +16,12 @@ def mapped(function: Callable[..., Tensor], value: Value, *others: Value) -> Val
     """`value` with every tensor replaced by `function` of it and of its peers in `others`.
 
     What is neither a tensor, a tuple nor a dataclass stays as it is.
+
+    Examples
+    --------
+    >>> pair = (torch.tensor([1.0]), (torch.tensor([2.0]), "as it is"))
+    >>> mapped(lambda tensor: 10 * tensor, pair)
+    (tensor([10.]), (tensor([20.]), 'as it is'))
     """
     if isinstance(value, Tensor):
         return function(value, *others)  # type: ignore[return-value]
@@ -46,7 +52,7 @@ def put(value: Value, rows: Tensor, new: Value) -> Value:
 
 
 def concatenate(values: Sequence[Value]) -> Value:
-    """One batch of all rows of `values`, in order."""
+    """One batch of all rows of `values`, in order; a single value is returned as it is."""
     if len(values) == 1:
         return values[0]
     return mapped(lambda *parts: torch.cat(parts), *values)

@@ -12,7 +12,7 @@ from unwrap.networks import (
     Network,
     NetworkName,
     Settings,
-    build,
+    build_network,
     load_unwrapper,
     network_class,
 )
@@ -91,16 +91,17 @@ class TrainConfig(BaseModel):
 
     def build(self) -> Network:
         """The network, with weights drawn from `seed`."""
+        # Layers draw their weights from torch's global generator, which is as before afterwards.
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(self.seed)
-            network = build(self.network, self.settings)
+            network = build_network(self.network, self.settings)
         if self.start_from is not None:
-            take_over(network, load_unwrapper(self.start_from).network)
+            transfer_layers_(network, load_unwrapper(self.start_from).network)
         return network
 
 
-def take_over(network: Network, other: Network) -> None:
-    """Copy the layers of `other` that have the same name and shape in `network`.
+def transfer_layers_(network: Network, other: Network) -> None:
+    """Overwrite the layers of `network` that have the same name and shape in `other`.
 
     Raises
     ------
@@ -108,6 +109,8 @@ def take_over(network: Network, other: Network) -> None:
         There is none, as the widths differ.
     """
     own = network.state_dict()
+    # Tensors without axes are counters of batches, which every network has: no layer is shared
+    # where only they fit.
     shared = {
         name: tensor
         for name, tensor in other.state_dict().items()

@@ -68,6 +68,7 @@ class Augmentation:
     ) -> tuple[Sensed, Truth]:
         """Vary frames and their truth alike; fresh tensors."""
         batch = len(sensed)
+        # Drawn whether or not they are used, so that no option changes what the others draw.
         sideways, upside = torch.rand(2, batch, generator=generator) < 0.5
         exponent, factor = 2 * torch.rand(2, batch, generator=generator) - 1
         for wanted, chosen, axis in (
@@ -84,7 +85,8 @@ class Augmentation:
 
 
 def _flip(images: Tensor, *, chosen: Tensor, axis: int) -> Tensor:
-    if images.ndim < 3:  # a number for each frame
+    """Mirror the `chosen` (bool [B]) of the maps [B, ..., H, W] about an axis."""
+    if images.ndim < 3:  # One number per frame, such as `Sensed.shift_m`, has no sides.
         return images
     chosen = chosen.to(images.device).reshape(-1, *[1] * (images.ndim - 1))
     return torch.where(chosen, images.flip(axis), images)
@@ -92,7 +94,17 @@ def _flip(images: Tensor, *, chosen: Tensor, axis: int) -> Tensor:
 
 @dataclass(frozen=True)
 class Order:
-    """What one batch consists of."""
+    """What one batch is asked to consist of; see `Source.batch`.
+
+    Attributes
+    ----------
+    numbers : tuple of int
+        Frames of the source.
+    draw : int
+        Which draw of the noise.
+    shots : Shots or None
+        Samples of each frame, or none.
+    """
 
     numbers: tuple[int, ...]
     draw: int
@@ -100,7 +112,7 @@ class Order:
 
 
 class Acquired(Dataset):
-    """Batches of a source, by their order."""
+    """Batches of a source, by their `Order`, as torch's data loaders want them."""
 
     def __init__(self, source: Source):
         self.source = source
@@ -131,11 +143,11 @@ class EpochShuffle(Sampler[Order]):
         for start in range(0, self.frames, self.batch_size):
             shots = self.shots[int(generator.integers(len(self.shots)))] if self.shots else None
             numbers = tuple(order[start : start + self.batch_size])
-            # Draw 0 is what networks are judged on.
+            # Draw 0 is what networks are validated and tested on (`JUDGED_DRAW`).
             yield Order(numbers, self.epoch + 1, shots)
 
     def __len__(self) -> int:
-        """Number of batches."""
+        """Number of batches, the last of which may be smaller."""
         return -(-self.frames // self.batch_size)
 
 
@@ -159,10 +171,10 @@ def loader(
 
 
 class AcquiredAhead:
-    """Batches of a source in the given order, acquired ahead of a GPU that would have to wait.
+    """Batches of a source in the given order, acquired ahead so that a GPU need not wait for them.
 
-    By threads, as torch computes without holding up the others, and processes forked beside a GPU
-    are fragile. The batches lie in memory that the GPU copies from by itself.
+    By threads, since torch lets other threads run while it computes, and since processes forked
+    beside a GPU are fragile. The batches lie in pinned memory, which the GPU copies from by itself.
 
     Parameters
     ----------
@@ -174,7 +186,7 @@ class AcquiredAhead:
     """
 
     batch_sampler = None
-    """There is none; the training loop asks for it where it finds a `sampler`."""
+    """None, which Lightning asks of a loader that has a `sampler`."""
 
     def __init__(self, source: Source, sampler: Sampler[Order] | list[Order], threads: int):
         self.sampler, self.threads, self._acquired = sampler, threads, Acquired(source)
@@ -185,17 +197,19 @@ class AcquiredAhead:
 
     def __iter__(self) -> Iterator[Batch]:
         """The batches; leaving the loop ends the threads."""
-        # Threads side by side are quicker than one operation spread over the cores.
+        # One torch thread in each, set by the pool's own threads as they start: frames side by side
+        # are quicker than one operation spread over the cores.
         pool = ThreadPoolExecutor(self.threads, initializer=torch.set_num_threads, initargs=(1,))
         waiting: deque[Future[Batch]] = deque()
         try:
             for order in self.sampler:
                 waiting.append(pool.submit(self._acquire, order))
+                # One more than there are threads, so that none is idle while a batch is used.
                 if len(waiting) > self.threads:
                     yield waiting.popleft().result()
             while waiting:
                 yield waiting.popleft().result()
-        finally:
+        finally:  # Also where the caller leaves the loop early.
             pool.shutdown(cancel_futures=True)
 
     def _acquire(self, order: Order) -> Batch:

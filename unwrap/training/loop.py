@@ -26,8 +26,7 @@ from torch import Tensor
 from unwrap.depth import nearest_wraps
 from unwrap.networks import Prediction, autocast, save_weights
 from unwrap.signal import Sensed, SensorDescription, Truth
-from unwrap.support import on_device, write_json
-from unwrap.training.allocator import keep_freed_memory
+from unwrap.support import keep_freed_memory, on_device, write_json
 from unwrap.training.config import TrainConfig
 from unwrap.training.data import (
     Batch,
@@ -39,16 +38,14 @@ from unwrap.training.data import (
     training_device,
 )
 
-__all__ = ["TrainConfig", "TrainingModule", "measure", "train", "wrap_hits"]
-
 AUGMENTATION_STREAM = 1
-"""Second word of the augmentation generator's seed, apart from the one that orders the frames."""
+"""Word in the seed of the augmentation, so that it differs from other seeds of the same step."""
 FORWARD_STREAM = 2
-"""Of what a network draws while it is trained."""
+"""The same for what a network draws in its forward pass."""
 JUDGED_DRAW = 0
-"""Draw of the noise that networks are judged on; no epoch of training sees it."""
+"""Draw of the noise that networks are validated and tested on; no epoch of training sees it."""
 
-NOTES_PER_EPOCH = 50
+LOGGED_PER_EPOCH = 50
 """Losses that TensorBoard is told of in an epoch; each makes a GPU wait for the processor."""
 
 ADVICE = (
@@ -81,6 +78,8 @@ class TrainingModule(lightning.LightningModule):
         """Loss of one augmented batch; all that is random in it follows from seed and step."""
         generator = torch.Generator().manual_seed(self._seed_of(AUGMENTATION_STREAM))
         sensed, truth = self.config.augmentation(*batch, generator=generator)
+        # Networks draw from the global generator (memory that is spoilt, say). Seeded by the step,
+        # a training that was resumed draws what one that was not interrupted does.
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(self._seed_of(FORWARD_STREAM))
             weights = self.config.loss_weights
@@ -94,6 +93,7 @@ class TrainingModule(lightning.LightningModule):
         predicted_m = self.predict(sensed).distance_m
         right, scored = wrap_hits(predicted_m, truth.distance_m, self.config)
         accuracy = (right & truth.known).sum() / (scored & truth.known).sum().clamp(min=1)
+        # Lightning averages over batches, weighted by `batch_size`.
         self.log("wrap_accuracy", accuracy, prog_bar=True, batch_size=len(sensed))
         if index == 0 and isinstance(self.logger, TensorBoardLogger):
             depths = torch.cat((truth.distance_m[0], predicted_m[0]), dim=1) / self.config.clamp_m
@@ -109,8 +109,9 @@ class TrainingModule(lightning.LightningModule):
         return on_device(batch, device)
 
     def _seed_of(self, stream: int) -> int:
-        """One 63-bit seed for a purpose in this step."""
+        """A seed for a purpose in this step, independent of those of other purposes and steps."""
         words = (self.config.seed, stream, self.global_step)
+        # torch takes signed seeds: 63 of the 64 bits.
         return int(np.random.SeedSequence(words).generate_state(1, np.uint64)[0] >> 1)
 
     def configure_optimizers(self) -> OptimizerLRScheduler:
@@ -150,7 +151,16 @@ class TrainingModule(lightning.LightningModule):
 
 
 def wrap_hits(predicted_m: Tensor, truth_m: Tensor, config: TrainConfig) -> tuple[Tensor, Tensor]:
-    """Which pixels the nearest-candidate merge puts right without noise, and which are scored."""
+    """Pixels [B, H, W] in the right wrap, were the phase free of noise, and pixels that are scored.
+
+    The wrap is that of the nearest-candidate merge; scored is what lies within `max_range_m`.
+
+    Examples
+    --------
+    >>> truth_m = torch.tensor([10.0, 10.0, 29.0])
+    >>> wrap_hits(torch.tensor([13.0, 13.3, 29.0]), truth_m, TrainConfig())
+    (tensor([ True, False, False]), tensor([ True,  True, False]))
+    """
     scored = truth_m <= config.max_range_m
     unambiguous_m = config.settings.unambiguous_m
     wraps = nearest_wraps(predicted_m, truth_m % unambiguous_m, unambiguous_m)
@@ -195,7 +205,7 @@ def train(
     """
     frames, validation, device = sources("train"), sources("validation"), training_device()
     if device.type == "cpu":
-        keep_freed_memory()
+        keep_freed_memory()  # For the rest of the process.
     shots, size = config.shown_shots, config.batch_size
     order = EpochShuffle(len(frames), size, shots, config.seed)
     judged = in_order(validation, size, shots, draw=JUDGED_DRAW)
@@ -203,21 +213,22 @@ def train(
     checkpoint = out / f"{config.network}.ckpt"
     threads = acquiring_threads(device)
     judging = loader(validation, judged, threads=threads)
-    with _quiet_lightning(), _interruptible():
+    with _quiet_lightning(), _ctrl_c_raises():
         _trainer(config, out, progress, len(order)).fit(
             module,
             loader(frames, order, threads=threads),
             judging,
             ckpt_path=str(checkpoint) if resume and checkpoint.is_file() else None,
-            weights_only=True,
+            weights_only=True,  # Nothing in a checkpoint is unpickled.
         )
+    # Confidences are calibrated on frames that the weights have not seen.
     module.eval().to(device)
     module.network.calibrate((on_device(batch, device) for batch in judging), validation.sensor)
     return _write(module, sources("test"), out)
 
 
 def _trainer(config: TrainConfig, out: Path, progress: bool, steps: int) -> lightning.Trainer:
-    """The training loop, for epochs of so many `steps`."""
+    """Lightning's trainer, for epochs of so many `steps`."""
     every_epoch = ModelCheckpoint(
         out, config.network, save_top_k=1, monitor=None, enable_version_counter=False
     )
@@ -230,7 +241,7 @@ def _trainer(config: TrainConfig, out: Path, progress: bool, steps: int) -> ligh
         num_sanity_val_steps=0,
         gradient_clip_val=config.clip_norm or None,
         logger=TensorBoardLogger(out, name="tensorboard", version=config.network),
-        log_every_n_steps=max(1, steps // NOTES_PER_EPOCH),
+        log_every_n_steps=max(1, steps // LOGGED_PER_EPOCH),
         benchmark=training_device().type == "cuda",
         devices=1,
     )
@@ -238,7 +249,7 @@ def _trainer(config: TrainConfig, out: Path, progress: bool, steps: int) -> ligh
 
 @contextmanager
 def _quiet_lightning() -> Iterator[None]:
-    """Silence advice that does not fit: workers do not pay off on few cores, and the like."""
+    """Silence Lightning's `ADVICE`, and what it logs below warnings, inside the context."""
     log = logging.getLogger("lightning.pytorch")
     level = log.level
     with warnings.catch_warnings():
@@ -252,8 +263,11 @@ def _quiet_lightning() -> Iterator[None]:
 
 
 @contextmanager
-def _interruptible() -> Iterator[None]:
-    """Turn the exit that Lightning makes of Ctrl-C back into KeyboardInterrupt."""
+def _ctrl_c_raises() -> Iterator[None]:
+    """Turn the exit that Lightning makes of Ctrl-C back into KeyboardInterrupt.
+
+    Its handler of the signal, which would outlive the training, gives way to the one of before.
+    """
     handler = signal.getsignal(signal.SIGINT)
     try:
         yield

@@ -6,7 +6,7 @@ import torch
 from shotenv.bank.opening import open_bank
 from shotenv.config.keywords import env_config
 from shotenv.dataset.sensed_frames import SensedFrames
-from unwrap.depth.correction import unwrapped
+from unwrap.depth.correction import correct_sensed
 from unwrap.depth.merge import nearest_wraps
 from unwrap.signal.frequencies import unambiguous_range_m
 from unwrap.signal.shots import Shots
@@ -77,7 +77,9 @@ def test_measured_truth_agrees_with_the_rendered_where_it_is_known(bank):
     assert error_m.median() < 0.1
     # It was recorded once, whatever the draw of the samples.
     assert torch.equal(measured.batch([0], draw=9, shots=None)[1].distance_m, truth.distance_m)
-    assert not torch.equal(unwrapped(sensed, None, measured.sensor).distance_m, truth.distance_m)
+    assert not torch.equal(
+        correct_sensed(sensed, None, measured.sensor).distance_m, truth.distance_m
+    )
 
 
 def test_stride_takes_every_second_row_and_column(bank):
@@ -91,7 +93,7 @@ def test_stride_takes_every_second_row_and_column(bank):
 def test_the_true_prediction_unwraps_what_is_scored(bank):
     frames = frames_of(bank)
     sensed, truth = frames.batch(range(4), draw=1, shots=Shots.FOUR)
-    depth = unwrapped(sensed, truth.distance_m, frames.sensor)
+    depth = correct_sensed(sensed, truth.distance_m, frames.sensor)
     wrong = (depth.distance_m - truth.distance_m).abs() > unambiguous_range_m(24e6) / 2
     assert not (wrong & frames.scored(range(4), draw=1)).any()
     wraps = nearest_wraps(truth.distance_m, depth.distance_m, unambiguous_range_m(24e6))

@@ -12,7 +12,7 @@ from unwrap.comparison.methods import SCORED_AT_ONCE, Estimate, Method, classica
 from unwrap.comparison.plan import TableConfig, trainings
 from unwrap.comparison.results_table import FIGURE, NUMBERS, PAGE, make_table
 from unwrap.comparison.scores import accuracy_and_precision, rows_of
-from unwrap.depth.correction import unwrapped
+from unwrap.depth.correction import correct_sensed
 from unwrap.depth.metrics import MIN_DEPTH_M
 from unwrap.signal.shots import Shots
 
@@ -53,7 +53,7 @@ def test_a_perfect_method_has_no_error_and_a_blind_one_the_scene_s(frames):
 
 def test_frames_looked_at_together_score_as_one_by_one(frames, monkeypatch):
     def look(sensed, sensor):
-        depth_m = unwrapped(sensed, 12 * sensed.gray, sensor).distance_m
+        depth_m = correct_sensed(sensed, 12 * sensed.gray, sensor).distance_m
         if sensed.memory is not None:
             depth_m = torch.where(sensed.memory.known > 0, sensed.memory.distance_m, depth_m)
         return Estimate(depth_m, sensed.gray)
@@ -135,7 +135,7 @@ def test_an_unknown_network_is_named(tmp_path):
 
 def test_two_frequencies_are_judged_without_rejection(frames):
     sensed, _ = frames.batch([0], draw=0, shots=Shots.EIGHT)
-    assert unwrapped(sensed, None, frames.sensor).distance_m.isnan().any()
+    assert correct_sensed(sensed, None, frames.sensor).distance_m.isnan().any()
     (method,) = (m for m in classical_methods(frames) if m.label.startswith("two frequencies"))
     depth_m = method.look(sensed, frames.sensor).depth_m
     assert torch.equal(depth_m.isnan(), sensed.raw.saturated)

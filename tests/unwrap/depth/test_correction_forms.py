@@ -11,11 +11,13 @@ import torch
 from unwrap.depth import correction
 from unwrap.depth.correction import correct
 from unwrap.depth.merge import NEAREST, RULES, Limits, merge_pixels
-from unwrap.signal.decoding import decode, decode_pixels
+from unwrap.signal.decoding import decode, decode_pixels, to_phase_, to_turns_
 from unwrap.signal.description import SensorDescription
 from unwrap.signal.frames import RawFrame
+from unwrap.signal.sensed import is_strong
 from unwrap.signal.shots import Shots, harmonic_weights
-from unwrap.signal.wiggle import FLAT, wiggle_of
+from unwrap.signal.wiggle import FLAT, WiggleTable, shift_turns_, wiggle_of
+from unwrap.support.compiled import array_of
 
 SHAPE = (3, 12, 37)
 WIGGLE = (wiggle_of(harmonic_weights(0.3, 7)), FLAT)
@@ -143,6 +145,71 @@ def test_other_values_take_the_array_operations():
         correct(RawFrame(raw.dcs_lsb[..., 1:], raw.saturated), predicted_m, SensorDescription())
 
 
+def merged(angle_rad, *, turns_table=FLAT.turns_table, shift_turns=0.0, amplitude=1.0, noise=1.0):
+    """Phase and validity of the compiled loop for angles [n]; the distance is the prediction."""
+    shape = (1, 1, len(angle_rad))
+    phase_rad, distance_m = angle_rad.numpy().copy().reshape(shape), np.zeros(shape, np.float32)
+    valid = np.zeros(shape, np.bool_)
+    merge_pixels(
+        phase_rad,
+        turns_table,
+        np.float32([shift_turns]),
+        array_of(amplitude, shape),
+        array_of(noise, shape),
+        np.zeros(shape, np.bool_),
+        np.full(shape, 7.0, np.float32),
+        Limits(*map(np.float32, (6.25, 6.2, 3.0))),
+        RULES["none"].branch,
+        distance_m,
+        valid,
+    )
+    assert (distance_m == 7).all()
+    return torch.from_numpy(phase_rad).flatten(), torch.from_numpy(valid).flatten()
+
+
+def apart_rad(one, other):
+    """Difference of phases, up to whole turns."""
+    return (one.double() - other.double() + math.pi).remainder(math.tau).sub(math.pi).abs()
+
+
+@pytest.mark.parametrize("errors", [(0.0,) * 4, (0.0, 0.1, -0.2, 0.3, 0.2), WIGGLE[0].error_rad])
+def test_the_loop_s_turns_are_those_of_the_wiggle_table(errors):
+    """At the entries of the table, on both sides of them, and at the ends."""
+    table = WiggleTable(errors)
+    entries = torch.arange(-len(errors) // 2, len(errors) // 2 + 1) * (math.tau / len(errors))
+    beside = torch.cat([entries + step for step in (0.0, -1e-6, 1e-6, 0.01)])
+    ends = torch.tensor([-math.pi, math.pi, -0.0, 1e-30, -1e-30])
+    angle_rad = torch.cat((beside, ends)).clamp(-math.pi, math.pi)
+    found, _ = merged(angle_rad, turns_table=table.turns_table)
+    assert found.min() >= 0 and found.max() < math.tau
+    assert apart_rad(found, to_phase_(table.turns_of(angle_rad))).max() < 3e-6
+
+
+@pytest.mark.parametrize("shift_m", [0.0, 0.4, -0.4, 6.2, 99.0])
+def test_the_loop_s_shift_is_that_of_shift_turns(both, shift_m):
+    angle_rad = torch.linspace(-3.1, 3.1, 100)
+    frequency_hz, shift = 24e6, torch.tensor([shift_m], dtype=torch.float64)
+    turns = shift_turns_(to_turns_(angle_rad.clone()).view(1, 1, -1), shift, frequency_hz)
+    samples = torch.stack((angle_rad.cos(), angle_rad.sin())).view(1, 2, 1, -1)
+    raw = RawFrame(samples, torch.zeros(1, 1, 100, dtype=torch.bool))
+    looped, arrays = both(raw, torch.zeros(1, 1, 100), SensorDescription(), shift_m=shift)
+    for frame in (looped, arrays):
+        assert apart_rad(frame.phase_rad, to_phase_(turns.clone())).max() < 3e-6
+
+
+def test_the_loop_s_strong_pixels_are_those_of_is_strong():
+    """At the limit itself, and one float to either side."""
+    noise = torch.tensor([0.5, 1.0, 1.7, 12.3, 0.0, 0.0])
+    limit = 3.0 * noise
+    for amplitude in (
+        limit,
+        torch.nextafter(limit, torch.tensor(torch.inf)),
+        torch.nextafter(limit, torch.tensor(0.0)),
+    ):
+        _, found = merged(torch.zeros(6), amplitude=amplitude, noise=noise)
+        assert torch.equal(found, is_strong(amplitude, noise, SensorDescription(min_snr=3.0)))
+
+
 def test_loops_equal_their_python():
     """Compiled or not: the rules of IEEE 754, in the order written."""
     raw, found = drawn(Shots.FOUR), []
@@ -156,7 +223,7 @@ def test_loops_equal_their_python():
         angle_rad = np.arctan2(made[1], made[0])
         merge(
             angle_rad,
-            WIGGLE[0].straight,
+            WIGGLE[0].turns_table,
             np.float32([0.0, 0.4, 0.9]),
             made[2],
             maps(40.0).numpy(),

@@ -14,14 +14,14 @@ from agents.cli.entry import main
 from shotenv.bank.opening import open_bank
 from shotenv.config.keywords import env_config
 from shotenv.sensor.description import describe
-from unwrap.depth.correction import unwrapped
+from unwrap.depth.correction import correct_sensed
 from unwrap.depth.merge import merge_nearest, merge_segmentation
 from unwrap.export import check as exporting
 from unwrap.export.export_frames import export_frames
 from unwrap.export.onnx_files import exported, run as run_content, run_torch, to_onnx
 from unwrap.networks.network import Settings
 from unwrap.networks.predictor import load_unwrapper
-from unwrap.networks.registry import build
+from unwrap.networks.registry import build_network
 from unwrap.networks.tofsegnet import TofSegNet
 from unwrap.networks.weight_files import save_weights
 from unwrap.signal.frames import RawFrame
@@ -90,7 +90,7 @@ def run(path, **inputs):
 def write_samples_network(path, name="toffusionnet", **metadata):
     """An untrained network that looks at samples, whose predictions vary from pixel to pixel."""
     torch.manual_seed(0)
-    network = build(name, Settings(width=4))
+    network = build_network(name, Settings(width=4))
     last = network.judge[-1] if name == "toffusionnet" else network.head
     last.weight.data.mul_(30.0 if name == "toffusionnet" else 1000.0)
     last.bias.data.zero_()
@@ -203,9 +203,9 @@ def test_the_pages_example_runs(capsys, monkeypatch, tmp_path, fused):
 def test_samples_become_what_the_unwrapper_and_the_correction_make_of_them(fused, sensor, shots):
     inputs, description = samples(shots), describe(sensor)
     found, sensed = run(fused / f"{shots}.onnx", **inputs), sensed_of(inputs)
-    looked = load_unwrapper(fused / f"{shots}.safetensors").look(sensed, description)
+    looked = load_unwrapper(fused / f"{shots}.safetensors").predict_sensed(sensed, description)
     merge = "none" if shots == 2 else "nearest"
-    depth = unwrapped(sensed, looked.distance_m, description, merge=merge)
+    depth = correct_sensed(sensed, looked.distance_m, description, merge=merge)
     np.testing.assert_array_equal(found["valid"], depth.valid.numpy())
     assert 0.5 < found["valid"].mean() < 0.95
     for name, expected in (

@@ -3,6 +3,7 @@ import torch
 
 from unwrap.networks.losses import (
     depth_guided_loss,
+    masked_mean,
     regression_loss,
     scale_invariant_loss,
     ssim_loss,
@@ -110,3 +111,9 @@ def test_equation_7_counts_unknown_pixels_as_right():
     assert one.item() == same.item()
     right = torch.where(known, truth, prediction)
     assert regression_loss(prediction, right, known=known).item() == pytest.approx(one.item())
+
+
+def test_a_masked_mean_is_zero_where_nothing_is_in_the_mask():
+    values = torch.tensor([1.0, torch.nan, 3.0])
+    assert masked_mean(values, torch.tensor([True, False, True])) == 2.0
+    assert masked_mean(values, torch.zeros(3, dtype=torch.bool)) == 0.0

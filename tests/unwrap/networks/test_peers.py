@@ -11,9 +11,9 @@ from peer_scenes import SENSOR, UNAMBIGUOUS_M, batch, samples, steps, wraps_of
 
 from unwrap.networks.losses import LossWeights
 from unwrap.networks.network import Settings, multiply_accumulates
-from unwrap.networks.peers.planes import judged, mean_of_known, sample_planes
+from unwrap.networks.peers.planes import sample_planes, with_agreement
 from unwrap.networks.peers.su import smoothness
-from unwrap.networks.registry import build
+from unwrap.networks.registry import build_network
 from unwrap.signal.description import SensorDescription
 from unwrap.signal.frames import RawFrame
 from unwrap.signal.sensed import Sensed, Truth
@@ -24,7 +24,7 @@ PEERS = ("su_net", "phasenet", "agresti_net", "chen_net")
 
 def network_of(name: str, width: int = 8):
     torch.manual_seed(1)
-    return build(name, Settings(width=width))
+    return build_network(name, Settings(width=width))
 
 
 def loss_of(network, sensed, truth):
@@ -121,7 +121,7 @@ def test_the_sky_may_be_anything_up_to_the_range(name):
 @pytest.mark.parametrize("name", PEERS)
 def test_compute_is_about_that_of_the_gray_networks(name):
     network, (sensed, _) = network_of(name, width=32).eval(), batch(4, 120, 160)
-    gray = build("tofregnet", Settings(width=32)).eval()
+    gray = build_network("tofregnet", Settings(width=32)).eval()
     ours, theirs = (
         multiply_accumulates(one, one.features(sensed, SENSOR)[:1]) for one in (network, gray)
     )
@@ -178,17 +178,10 @@ def test_a_distance_is_trusted_by_how_near_it_lies_to_a_wrap_candidate():
     distance_m = torch.full((1, 2, 4), 2.0)
     sensed = Sensed(torch.zeros_like(distance_m), samples(distance_m, 100.0, 4))
     offsets = torch.tensor([0.0, 1.0, 2.0, 2.25]) * UNAMBIGUOUS_M + 2.0
-    found = judged(offsets.expand(1, 2, 4), sensed, SENSOR)
+    found = with_agreement(offsets.expand(1, 2, 4), sensed, SENSOR)
     torch.testing.assert_close(found.confidence[0, 0], torch.tensor([1.0, 1.0, 1.0, 0.5]))
-    below = judged(torch.full((1, 2, 4), 2.0 - 0.75 * UNAMBIGUOUS_M), sensed, SENSOR)
+    below = with_agreement(torch.full((1, 2, 4), 2.0 - 0.75 * UNAMBIGUOUS_M), sensed, SENSOR)
     assert (below.confidence == 0).all()
-
-
-def test_phasenet_counts_wraps_from_the_measured_phase():
-    network = network_of("phasenet")
-    true_m = torch.tensor([0.1, 1.0, 1.001, 2.5, 9.0]) * UNAMBIGUOUS_M
-    wrapped_m = torch.tensor([0.1, 0.99, 0.001, 0.5, 0.0]) * UNAMBIGUOUS_M
-    assert network.wrap_counts(true_m, wrapped_m).tolist() == [0, 0, 1, 2, 4]
 
 
 def test_smoothness_is_the_damped_variation_of_known_pairs():
@@ -198,9 +191,3 @@ def test_smoothness_is_the_damped_variation_of_known_pairs():
     across = (2 * 0.2 * math.exp(-1) + 0.0) / 3
     down = 0.0
     assert float(smoothness(prediction, target, known)) == pytest.approx(across + down)
-
-
-def test_mean_of_known_is_zero_where_nothing_is_known():
-    values = torch.tensor([1.0, torch.nan, 3.0])
-    assert mean_of_known(values, torch.tensor([True, False, True])) == 2.0
-    assert mean_of_known(values, torch.zeros(3, dtype=torch.bool)) == 0.0

@@ -1,20 +1,15 @@
 import pickle
-import subprocess
-import sys
 
 import pytest
 import torch
-from raw_frames import RANGE_M, SENSOR, raw_frame
+from raw_frames import RANGE_M
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
-from unwrap.depth.correction import correct
 from unwrap.networks.predictor import FRAMES_AT_ONCE, SHIPPED, load_unwrapper
 from unwrap.networks.tofregnet import TofRegNet
 from unwrap.networks.tofsegnet import TofSegNet
 from unwrap.networks.weight_files import save_weights
-from unwrap.signal.frames import RawFrame
-from unwrap.signal.frequencies import unambiguous_range_m
 
 
 def metadata(name, **changes):
@@ -29,11 +24,6 @@ def path(request, tmp_path):
     path = tmp_path / f"{request.param}.safetensors"
     save_weights(path, network, metadata(request.param))
     return path
-
-
-@pytest.fixture
-def truth():
-    return torch.linspace(0.05, 24.95, 2 * 20 * 30, dtype=torch.float64).reshape(2, 20, 30)
 
 
 @pytest.mark.parametrize("name", ["tofregnet", "tofsegnet", "toffusionnet"])
@@ -169,96 +159,3 @@ def test_safetensors_of_something_else_is_refused(tmp_path):
     save_file({"a": torch.zeros(2)}, tmp_path / "a.safetensors")
     with pytest.raises(ValueError, match=r"a\.safetensors.*schema"):
         load_unwrapper(tmp_path / "a.safetensors")
-
-
-@pytest.mark.parametrize("merge", ["nearest", "floor"])
-@pytest.mark.parametrize("count", [2, 4])
-def test_few_samples_and_a_perfect_prediction_give_the_truth(truth, count, merge):
-    frame = correct(raw_frame(truth, count), truth.float(), SENSOR, merge=merge)
-    away = (truth % RANGE_M - RANGE_M / 2).abs() < RANGE_M / 2 - 0.06
-    torch.testing.assert_close(frame.distance_m[away], truth[away].float(), rtol=0, atol=1e-3)
-    assert torch.equal(frame.wraps[away], (truth[away] / RANGE_M).long())
-    assert frame.valid.all()
-
-
-@pytest.mark.parametrize("count", [2, 4])
-def test_unmerged_the_prediction_stands_and_is_not_written_to(truth, count):
-    raw, predicted_m = raw_frame(truth, count), truth.float() + 0.3
-    before = predicted_m.clone()
-    frame = correct(raw, predicted_m, SENSOR, merge="none")
-    assert torch.equal(frame.distance_m, before)
-    assert frame.valid.all()
-    eight = correct(raw_frame(truth, 8), predicted_m, SENSOR, merge="none")
-    torch.testing.assert_close(eight.distance_m, truth.float(), rtol=0, atol=1e-3)
-    assert torch.equal(predicted_m, before)
-
-
-def test_eight_samples_need_no_prediction(truth):
-    frame = correct(raw_frame(truth, 8), None, SENSOR)
-    torch.testing.assert_close(frame.distance_m, truth.float(), rtol=0, atol=1e-3)
-    assert frame.valid.all()
-
-
-def test_invalid_pixels_hold_the_prediction_or_nan(truth):
-    raw = raw_frame(truth, 8)
-    raw.saturated[0, 0, 0] = True
-    raw.dcs_lsb[0, :, 0, 1] *= 0.001
-    guessed = correct(raw, torch.full(truth.shape, 9.0), SENSOR)
-    assert guessed.valid.sum() == truth.numel() - 2
-    assert guessed.distance_m[0, 0, :2].tolist() == [9.0] * 2
-    assert guessed.wraps[0, 0, :2].tolist() == [1] * 2
-    unknown = correct(raw, None, SENSOR)
-    assert unknown.distance_m[0, 0, :2].isnan().all()
-    assert torch.equal(unknown.valid, guessed.valid)
-
-
-def test_where_the_frequencies_disagree_the_prediction_decides(truth):
-    raw = raw_frame(truth, 8)
-    raw.dcs_lsb[0, 4:, 0, 2] = raw_frame(truth + 1.2, 8).dcs_lsb[0, 4:, 0, 2]
-    unambiguous = unambiguous_range_m(SENSOR.f1_hz)
-    second_wrap = truth.float() + unambiguous
-    frame = correct(raw, second_wrap, SENSOR)
-    expected = truth[0, 0, 2].item() + unambiguous
-    assert frame.distance_m[0, 0, 2].item() == pytest.approx(expected, abs=1e-3)
-    assert frame.valid.all()
-    others = torch.ones_like(truth, dtype=torch.bool)
-    others[0, 0, 2] = False
-    torch.testing.assert_close(frame.distance_m[others], truth.float()[others], rtol=0, atol=1e-3)
-    alone = correct(raw, None, SENSOR)
-    assert not alone.valid[0, 0, 2] and alone.valid[others].all()
-
-
-def test_noise_map_decides_what_is_valid(truth):
-    noise = torch.where(truth < 10, 100.0, 300.0)
-    frame = correct(raw_frame(truth, 4), truth.float(), SENSOR, noise_lsb=noise)
-    assert torch.equal(frame.valid, truth < 10)
-
-
-def test_offset_map_is_subtracted(truth):
-    offset = torch.linspace(-50, 50, 20 * 30).reshape(20, 30)
-    raw = raw_frame(truth, 2)
-    shifted = RawFrame(raw.dcs_lsb + offset, raw.saturated)
-    frame = correct(shifted, truth.float(), SENSOR, offset_lsb=offset)
-    expected = correct(raw, truth.float(), SENSOR)
-    torch.testing.assert_close(frame.distance_m, expected.distance_m, rtol=0, atol=1e-3)
-
-
-def test_correct_refuses_what_it_cannot_do(truth):
-    with pytest.raises(ValueError, match="predicted_m is None"):
-        correct(raw_frame(truth, 4), None, SENSOR)
-    with pytest.raises(ValueError, match="merge is 'ceil'"):
-        correct(raw_frame(truth, 4), truth, SENSOR, merge="ceil")
-
-
-def test_import_is_light():
-    code = "import sys, unwrap; assert not {'torch', 'numpy'} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
-
-
-def test_public_names():
-    import unwrap
-
-    assert callable(unwrap.load_unwrapper)
-    assert callable(unwrap.correct)
-    with pytest.raises(AttributeError, match="nothing"):
-        _ = unwrap.nothing

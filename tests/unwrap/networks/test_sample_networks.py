@@ -24,12 +24,12 @@ from shotenv.env.vector import ShotScheduleVectorEnv
 from unwrap.depth.correction import correct
 from unwrap.networks.network import Settings
 from unwrap.networks.predictor import load_unwrapper
-from unwrap.networks.registry import build
+from unwrap.networks.registry import build_network
 from unwrap.networks.weight_files import save_weights
 from unwrap.signal.calibrated import decode_at
 from unwrap.signal.decoding import distance_m
 from unwrap.signal.frequencies import unambiguous_range_m
-from unwrap.signal.sensed import Sensed, measured
+from unwrap.signal.sensed import Sensed, wrapped_and_valid
 from unwrap.signal.shots import Shots
 
 RANGE_M = unambiguous_range_m(24e6)
@@ -40,7 +40,7 @@ SEEDS = [21, 22]
 def write(path, f1_hz=24e6):
     """An untrained TofFusionNet whose curves vary from pixel to pixel."""
     torch.manual_seed(0)
-    network = build("toffusionnet", Settings(width=4, f1_hz=f1_hz))
+    network = build_network("toffusionnet", Settings(width=4, f1_hz=f1_hz))
     network.judge[-1].weight.data.mul_(30.0)
     save_weights(path, network, {"network": "toffusionnet", "width": 4, "f1_hz": f1_hz})
     return str(path)
@@ -97,12 +97,14 @@ def test_depth_lies_in_the_wrap_that_the_network_finds_in_the_samples(problem, f
         made.noise_lsb,
         drive.drift_m,
     )
-    own_m = load_unwrapper(fusing["unwrapper"]).look(sensed, problem.description).distance_m
+    own_m = (
+        load_unwrapper(fusing["unwrapper"]).predict_sensed(sensed, problem.description).distance_m
+    )
     assert torch.equal(made.predicted_m, own_m)
-    wrapped_m, signal = measured(sensed, problem.description)
+    wrapped_m, valid = wrapped_and_valid(sensed, problem.description)
     trusted = made.depth.valid & (wrapped_m < problem.description.saturation_range_m)
     wraps = (own_m - wrapped_m) / RANGE_M
-    assert (signal == made.depth.valid).float().mean() > 0.99
+    assert (valid == made.depth.valid).float().mean() > 0.99
     assert len(wraps[trusted].round().unique()) > 1
     expected_m = wrapped_m + wraps.round().clamp(min=0) * RANGE_M
     torch.testing.assert_close(

@@ -9,11 +9,11 @@ from unwrap_source import HEIGHT, SENSOR, WIDTH, Walls
 
 from unwrap.networks.network import Settings, autocast
 from unwrap.networks.predictor import load_unwrapper
-from unwrap.networks.registry import build
-from unwrap.networks.sizes import enlarged, stride_to, thinned, trained_size
+from unwrap.networks.registry import build_network
+from unwrap.networks.sizes import stride_to, thin, trained_size, upsample
 from unwrap.networks.weight_files import save_weights
 from unwrap.signal.frequencies import unambiguous_range_m
-from unwrap.signal.sensed import Memory, Sensed, measured
+from unwrap.signal.sensed import Memory, Sensed, wrapped_and_valid
 from unwrap.signal.shots import Shots
 from unwrap.support.tensors import mapped
 
@@ -24,7 +24,7 @@ RANGE_M = unambiguous_range_m(SENSOR.f1_hz)
 def write(path, name, **told):
     """An untrained network whose outputs vary from pixel to pixel."""
     torch.manual_seed(0)
-    network = build(name, Settings(width=4))
+    network = build_network(name, Settings(width=4))
     last = network.judge[-1] if name == "toffusionnet" else network.head
     last.weight.data.mul_(30.0)
     save_weights(path, network, {"network": name, "width": 4, "f1_hz": SENSOR.f1_hz, **told})
@@ -64,14 +64,14 @@ def test_enlarged_maps_are_linear_between_the_pixels_that_were_seen(stride):
     maps = torch.rand(2, 5, 7, generator=torch.Generator().manual_seed(0))
     rows, columns = (np.arange(n * stride) / stride for n in maps.shape[1:])
     expected = [
-        # np.interp holds the last value behind the last place, as `enlarged` does.
+        # np.interp holds the last value behind the last place, as `upsample` does.
         [np.interp(columns, range(7), row) for row in image]
         for image in maps.numpy()
     ]
     expected = np.array(
         [[np.interp(rows, range(5), column) for column in np.transpose(i)] for i in expected]
     ).transpose(0, 2, 1)
-    np.testing.assert_allclose(enlarged(maps, stride).numpy(), expected, atol=1e-6)
+    np.testing.assert_allclose(upsample(maps, stride).numpy(), expected, atol=1e-6)
 
 
 def test_everything_that_has_pixels_is_thinned():
@@ -79,7 +79,7 @@ def test_everything_that_has_pixels_is_thinned():
     memory = Memory(sensed.gray + 1, sensed.gray)
     whole = Sensed(sensed.gray, sensed.raw, sensed.gray + 2, sensed.noise_lsb, torch.ones(2))
     whole = Sensed(**{**vars(whole), "memory": memory})
-    few, seen = thinned(whole, 2), []
+    few, seen = thin(whole, 2), []
     mapped(lambda t: seen.append(t.shape), few)
     assert seen.count((2, *SMALL)) == 6 and (2, 4, *SMALL) in seen and (2,) in seen
     assert torch.equal(few.raw.dcs_lsb, whole.raw.dcs_lsb[..., ::2, ::2])
@@ -103,17 +103,17 @@ def test_gray_networks_see_large_frames_as_they_were_trained(small, name):
 def test_networks_of_samples_tell_the_distance_of_every_pixel(small):
     unwrapper = small("toffusionnet")
     sensed, _ = Walls(2).batch([0, 1], draw=1, shots=Shots.FOUR)
-    large = unwrapper.look(sensed, SENSOR).distance_m
-    coarse = enlarged(unwrapper.look(thinned(sensed, 2), SENSOR).distance_m, 2)
-    wrapped_m, signal = measured(sensed, SENSOR)
-    assert 0.05 < 1 - signal.float().mean() < 0.9
+    large = unwrapper.predict_sensed(sensed, SENSOR).distance_m
+    coarse = upsample(unwrapper.predict_sensed(thin(sensed, 2), SENSOR).distance_m, 2)
+    wrapped_m, valid = wrapped_and_valid(sensed, SENSOR)
+    assert 0.05 < 1 - valid.float().mean() < 0.9
     wraps = (large - wrapped_m) / RANGE_M
-    assert (wraps - wraps.round())[signal].abs().max() < 1e-4
-    assert len(wraps[signal].round().unique()) > 1
+    assert (wraps - wraps.round())[valid].abs().max() < 1e-4
+    assert len(wraps[valid].round().unique()) > 1
     # Nearest: at most half a range off, but for the first wrap, before which there is none.
-    off_m = (large - coarse)[signal & (wraps.round() > 0)]
+    off_m = (large - coarse)[valid & (wraps.round() > 0)]
     assert off_m.abs().max() <= RANGE_M / 2 + 1e-3
-    torch.testing.assert_close(large[~signal], coarse[~signal])
+    torch.testing.assert_close(large[~valid], coarse[~valid])
 
 
 def test_other_sizes_are_seen_as_they_are(small):

@@ -12,23 +12,23 @@ from peer_scenes import SENSOR, UNAMBIGUOUS_M, batch, samples, wraps_of
 from unwrap.depth.confidence import expected_calibration_error
 from unwrap.networks.losses import LossWeights
 from unwrap.networks.network import Settings, multiply_accumulates
-from unwrap.networks.registry import build
+from unwrap.networks.registry import build_network
 from unwrap.networks.toffusionnet import (
-    DOUBTED,
     FORGOTTEN,
     KNOTS_PER_WRAP,
+    SPOILT,
     VECTOR,
     TofFusionNet,
     candidate_scores,
     correction_rad,
-    doubted,
     knot_entropy,
     mean_distance_m,
     memory_maps,
-    own_wraps,
+    spoil_memory,
+    true_wraps,
 )
 from unwrap.networks.tofregnet import TofRegNet
-from unwrap.signal.sensed import Memory, Sensed, Truth, measured
+from unwrap.signal.sensed import Memory, Sensed, Truth, wrapped_and_valid
 from unwrap.support.tensors import mapped
 
 SETTINGS = Settings(width=8)
@@ -37,7 +37,7 @@ KNOTS = KNOTS_PER_WRAP * SETTINGS.classes + 1
 
 def untrained(seed: int = 1) -> TofFusionNet:
     torch.manual_seed(seed)
-    network = build("toffusionnet", SETTINGS)
+    network = build_network("toffusionnet", SETTINGS)
     assert isinstance(network, TofFusionNet)
     return network
 
@@ -125,8 +125,8 @@ def test_distance_lies_about_the_pixel_s_own_candidates_where_there_is_signal():
     sensed, _ = batch(2)
     network = untrained().eval()
     output = 3 * torch.randn(2, KNOTS + VECTOR, 48, 64, generator=torch.Generator().manual_seed(0))
-    wrapped_m, signal = measured(sensed, SENSOR)
-    assert signal.all()
+    wrapped_m, valid = wrapped_and_valid(sensed, SENSOR)
+    assert valid.all()
     found_m = network.predict(output, sensed, SENSOR).distance_m
     correction_m = network.parts(output, wrapped_m)[1]
     assert correction_m.abs().max() <= UNAMBIGUOUS_M / 4
@@ -187,12 +187,6 @@ def test_candidates_equal_numpy_interpolation():
         at_m = wrapped_m[0, row, column] + n * UNAMBIGUOUS_M
         expected = np.interp(at_m, knots_m, scores[0, :, row, column])
         assert float(found[0, n, row, column]) == pytest.approx(expected, abs=1e-4)
-
-
-def test_own_wraps_follow_the_measured_phase_over_a_boundary():
-    true_m = torch.tensor([[[6.3, 6.2, 12.6, 29.9, 0.02]]])
-    wrapped_m = torch.tensor([[[6.2, 0.05, 0.1, 0.1, 6.2]]])
-    assert own_wraps(true_m, wrapped_m, SETTINGS).tolist() == [[[0, 1, 2, 4, 0]]]
 
 
 def test_knot_entropy_is_that_of_a_shared_label():
@@ -262,13 +256,13 @@ def test_memory_maps_are_zero_where_nothing_is_known():
 def test_doubted_memory_is_withheld_erased_and_moved_in_its_shares():
     torch.manual_seed(0)
     memory = Memory(torch.full((600, 12, 16), 10.0), torch.ones(600, 12, 16))
-    shown = doubted(memory, UNAMBIGUOUS_M)
+    shown = spoil_memory(memory, UNAMBIGUOUS_M)
     some = shown.known.flatten(1).any(1)
     assert float(some.float().mean()) == pytest.approx(1 - FORGOTTEN, abs=0.06)
     distance_m = shown.distance_m[some]
     for moved_m in (0.0, 10 - UNAMBIGUOUS_M, 10 + UNAMBIGUOUS_M):
         share = (distance_m - moved_m).abs() < 1e-4
-        assert float(share.float().mean()) == pytest.approx(DOUBTED, abs=0.02)
+        assert float(share.float().mean()) == pytest.approx(SPOILT, abs=0.02)
     assert torch.equal(shown.known, (shown.distance_m > 0).float())
     # Blocks of 2 x 2 pixels share their fate.
     assert torch.equal(shown.distance_m[:, ::2, ::2], shown.distance_m[:, 1::2, 1::2])
@@ -306,7 +300,7 @@ def overconfident_frames(shots: int, factor: float) -> tuple[Overconfident, Sens
         samples(measured_m, 100.0, shots),
         noise_lsb=torch.ones(2, 96, 128),
     )
-    wrapped_m, _ = measured(sensed, SENSOR)
+    wrapped_m, _ = wrapped_and_valid(sensed, SENSOR)
     odds = candidate_scores(scores[:, :KNOTS], wrapped_m, UNAMBIGUOUS_M).softmax(1)
     wraps = torch.multinomial(odds.movedim(1, -1).flatten(0, -2), 1, generator=generator)
     distance_m = wrapped_m + wraps.view(2, 96, 128) * UNAMBIGUOUS_M
@@ -320,11 +314,11 @@ def test_calibration_makes_overconfident_scores_honest(shots):
 
     def error():
         found = network.eval().predict(network.made_up, sensed, SENSOR)
-        wrapped_m, signal = measured(sensed, SENSOR)
-        right = own_wraps(truth.distance_m, wrapped_m, SETTINGS) == own_wraps(
+        wrapped_m, valid = wrapped_and_valid(sensed, SENSOR)
+        right = true_wraps(truth.distance_m, wrapped_m, SETTINGS) == true_wraps(
             found.distance_m, wrapped_m, SETTINGS
         )
-        return expected_calibration_error(found.confidence[signal], right[signal])
+        return expected_calibration_error(found.confidence[valid], right[valid])
 
     assert error() > 0.15
     network.calibrate([(sensed, truth)], SENSOR)

@@ -17,7 +17,7 @@ from unwrap.signal.wiggle import (
     measure_wiggle,
     read_wiggle,
     wiggle_of,
-    wrapped,
+    wrap_phase,
     write_wiggle,
 )
 
@@ -44,8 +44,9 @@ def test_weights_are_those_of_a_triangle():
     assert harmonic_weights(0.5, 1) == ((1, 1.0),)
     assert harmonic_weights(0.5, 5) == ((1, 1.0), (3, 0.5 / 9), (5, 0.5 / 25))
     # All harmonics together are 8 / pi^2 parts of a triangle of height 1.
-    many = correlation_samples(PERIOD, harmonic_weights(1.0, 2001))[0] * 8 / math.pi**2
-    triangle = 1 - 2 / math.pi * torch.acos(torch.cos(PERIOD))
+    phase = PERIOD[::20]
+    many = correlation_samples(phase, harmonic_weights(1.0, 2001))[0] * 8 / math.pi**2
+    triangle = 1 - 2 / math.pi * torch.acos(torch.cos(phase))
     assert (many - triangle).abs().max() < 5e-4
 
 
@@ -128,7 +129,7 @@ def test_the_table_is_linear_between_its_entries_and_periodic(errors):
 
 def test_wrapped_phases_stay_below_two_pi():
     phase = torch.tensor([-1e-9, -1.0, 0.0, TWO_PI, 7.0, BELOW_TWO_PI])
-    found = wrapped(phase.clone())
+    found = wrap_phase(phase.clone())
     assert found.min() >= 0 and found.max() <= BELOW_TWO_PI
     assert apart(found, phase).abs().max() < 1e-6
 

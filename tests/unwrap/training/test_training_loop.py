@@ -9,8 +9,6 @@ from safetensors.torch import load_file
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from unwrap_source import HEIGHT, SENSOR, WIDTH, Walls
 
-from unwrap.networks.autoencoder import wrap_classes
-from unwrap.networks.network import Settings
 from unwrap.networks.predictor import load_unwrapper
 from unwrap.networks.sizes import trained_size
 from unwrap.networks.weight_files import save_weights
@@ -164,11 +162,6 @@ def test_configuration_is_checked(wrong):
         TrainConfig(**wrong)
 
 
-def test_classes_are_wraps_and_the_last_is_all_beyond():
-    depth_m = torch.tensor([0.0, 6.2, 6.3, 24.9, 25.0, 30.0])
-    assert wrap_classes(depth_m, Settings(classes=5)).tolist() == [0, 0, 1, 3, 4, 4]
-
-
 def test_hits_are_predictions_within_half_a_wrap():
     truth_m = torch.tensor([3.0, 10.0, 10.0, 29.0])
     predicted_m = truth_m + torch.tensor([3.0, -3.0, 3.3, 0.0])
@@ -177,7 +170,7 @@ def test_hits_are_predictions_within_half_a_wrap():
     assert scored.tolist() == [True, True, True, False]
 
 
-def test_start_from_takes_over_the_layers_that_fit(tmp_path):
+def test_start_from_transfers_the_layers_that_fit(tmp_path):
     other = TrainConfig(network="tofregnet", width=4, seed=1).build()
     save_weights(
         tmp_path / "other.safetensors",

@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from unwrap.networks import LossWeights, Network, Prediction, Settings, compressed, convolution, pad
-from unwrap.networks.peers.planes import judged, mean_of_known
-from unwrap.signal import Sensed, SensorDescription, Truth, distance_m, first_phase, noise_of
+from unwrap.networks import (
+    LossWeights,
+    Network,
+    Prediction,
+    Settings,
+    convolution,
+    log_snr,
+    masked_mean,
+    pad,
+)
+from unwrap.networks.peers.planes import with_agreement
+from unwrap.signal import (
+    Sensed,
+    SensorDescription,
+    Truth,
+    distance_m,
+    first_phase,
+    sample_noise_lsb,
+)
 
 
 class AgrestiNet(Network):
@@ -43,16 +57,11 @@ class AgrestiNet(Network):
         )
         self.head = nn.Conv2d(coarse + fine, 1, 3, padding=1)
 
-    @classmethod
-    def build(cls, settings: Settings) -> Self:
-        """Untrained."""
-        return cls(settings)
-
     def features(self, sensed: Sensed, sensor: SensorDescription) -> Tensor:
         """Wrapped distance over the unambiguous range, and compressed amplitude: [B, 2, H, W]."""
         frame = first_phase(sensed, sensor)
         wrapped = distance_m(frame.phase_rad, sensor.f1_hz) / self.settings.unambiguous_m
-        amplitude = compressed(frame.amplitude / noise_of(sensed, sensor))
+        amplitude = log_snr(frame.amplitude / sample_noise_lsb(sensed, sensor))
         return torch.stack((wrapped, amplitude), 1).contiguous(memory_format=torch.channels_last)
 
     def forward(self, maps: Tensor) -> Tensor:
@@ -75,8 +84,8 @@ class AgrestiNet(Network):
         weights: LossWeights,
     ) -> Tensor:
         """Mean |error| over `range_m`; `weights` belong to the project's own loss."""
-        return mean_of_known((output - truth.distance_m).abs(), truth.known) / self.settings.range_m
+        return masked_mean((output - truth.distance_m).abs(), truth.known) / self.settings.range_m
 
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
-        """The distance, in 0..range_m; its confidence: agreement with the phase, see `judged`."""
-        return judged(output.clamp(0.0, self.settings.range_m), sensed, sensor)
+        """The distance, in 0..range_m; its confidence: see `with_agreement`."""
+        return with_agreement(output.clamp(0.0, self.settings.range_m), sensed, sensor)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 import torch
 from torch import Tensor
 from torch.nn import functional
@@ -15,33 +13,29 @@ from unwrap.networks import (
     Prediction,
     Settings,
     class_depth_m,
+    masked_mean,
     pad,
     wrap_classes,
 )
-from unwrap.networks.peers.planes import PLANES, mean_of_known, sample_planes
-from unwrap.signal import TWO_PI, Sensed, SensorDescription, Truth, distance_m, wrapped
+from unwrap.networks.peers.planes import PLANES, sample_planes
+from unwrap.signal import TWO_PI, Sensed, SensorDescription, Truth, distance_m, wrap_phase
 
 
 class ChenNet(Autoencoder):
-    """Samples and gray image to a clean phase vector and wrap logits.
+    """Samples and gray image to a noise-free phase, as its unit vector, and wrap logits.
 
     After Y. Chen, J. Ren, X. Cheng, K. Qian, L. Wang, J. Gu, Very Power Efficient Neural
     Time-of-Flight, WACV 2020: raw samples at low exposure, guided by the camera's passive image,
-    to depth. Adapted: the guide is gray instead of colour; the depth comes as a phase vector, which
-    is what clean samples at one frequency tell, predicted as what to add to the measured one, and a
-    wrap class; the body is the autoencoder of
-    this project's own networks; the exposure is the sensor's.
+    to depth. Adapted: the guide is gray instead of colour; the depth comes as a wrap class and the
+    unit vector of the phase, which is what clean samples at one frequency tell, predicted as what
+    to add to the measured vector; the body is the autoencoder of this project's own networks; the
+    exposure is the sensor's.
     """
 
     needs = "samples"
 
     def __init__(self, settings: Settings):
         super().__init__(settings, PLANES + 1, 2 + settings.classes)
-
-    @classmethod
-    def build(cls, settings: Settings) -> Self:
-        """Untrained."""
-        return cls(settings)
 
     def features(self, sensed: Sensed, sensor: SensorDescription) -> Tensor:
         """`sample_planes` and the gray image, scaled to [-1, 1]: [B, 8, H, W]."""
@@ -71,18 +65,18 @@ class ChenNet(Autoencoder):
         """
         phase = truth.distance_m * (TWO_PI / self.settings.unambiguous_m)
         aligned = output[:, 0] * phase.cos() + output[:, 1] * phase.sin()
-        met = truth.known & (truth.distance_m < self.settings.range_m)
+        unclamped = truth.known & (truth.distance_m < self.settings.range_m)
         classes = wrap_classes(truth.distance_m, self.settings)
         unlikely = functional.cross_entropy(output[:, 2:], classes, reduction="none")
-        return mean_of_known(1 - aligned, met) + mean_of_known(unlikely, truth.known)
+        return masked_mean(1 - aligned, unclamped) + masked_mean(unlikely, truth.known)
 
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
-        """The clean phase's wrap candidate nearest to `class_depth_m`.
+        """The noise-free phase's wrap candidate nearest to `class_depth_m`.
 
         The confidence is the likeliest class's probability.
         """
         logits, unambiguous_m = output[:, 2:], self.settings.unambiguous_m
-        phase = wrapped(torch.atan2(output[:, 1], output[:, 0]))
+        phase = wrap_phase(torch.atan2(output[:, 1], output[:, 0]))
         clean_m = distance_m(phase, self.settings.f1_hz)
         wraps = nearest_wraps(class_depth_m(logits, unambiguous_m), clean_m, unambiguous_m)
         return Prediction(clean_m + wraps * unambiguous_m, logits.softmax(1).amax(1))

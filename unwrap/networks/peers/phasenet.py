@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import Self
 
 from torch import Tensor, nn
 from torch.nn import functional
 
-from unwrap.depth import nearest_wraps
-from unwrap.networks import LossWeights, Network, Prediction, Settings, convolution, pad
-from unwrap.networks.peers.planes import mean_of_known
+from unwrap.networks import (
+    LossWeights,
+    Network,
+    Prediction,
+    Settings,
+    convolution,
+    masked_mean,
+    pad,
+    true_wraps,
+)
 from unwrap.signal import Sensed, SensorDescription, Truth, first_phase, wrapped_distance_m
 
 
@@ -39,11 +45,6 @@ class PhaseNet(Network):
         self.decoder = nn.ModuleList(map(convolution, falling[:-1], falling[1:]))
         self.head = nn.Conv2d(channels[0], settings.classes, 3, padding=1)
 
-    @classmethod
-    def build(cls, settings: Settings) -> Self:
-        """Untrained."""
-        return cls(settings)
-
     def features(self, sensed: Sensed, sensor: SensorDescription) -> Tensor:
         """Wrapped phase [B, 1, H, W], scaled to [-1, 1)."""
         return first_phase(sensed, sensor).phase_rad.unsqueeze(1) / math.pi - 1.0
@@ -56,6 +57,7 @@ class PhaseNet(Network):
             features, place = functional.max_pool2d(encode(features), 2, return_indices=True)
             places.append(place)
         features = self.middle(features)
+        # The head unpools, too: there are as many levels as decoder layers and head.
         for decode in (*self.decoder, self.head):
             features = decode(functional.max_unpool2d(features, places.pop(), [2, 2]))
         return features[..., :height, :width].float()
@@ -69,10 +71,10 @@ class PhaseNet(Network):
         weights: LossWeights,
     ) -> Tensor:
         """Cross entropy over the pixels of known truth; `weights` are of the project's own loss."""
-        counts = self.wrap_counts(truth.distance_m, wrapped_distance_m(sensed, sensor))
-        return mean_of_known(
-            functional.cross_entropy(output, counts, reduction="none"), truth.known
-        )
+        # Counted from the measured phase, as the paper's: noise next to a wrap costs no whole one.
+        wrapped_m = wrapped_distance_m(sensed, sensor)
+        counts = true_wraps(truth.distance_m, wrapped_m, self.settings)
+        return masked_mean(functional.cross_entropy(output, counts, reduction="none"), truth.known)
 
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         """Likeliest count times the unambiguous range plus the wrapped distance.
@@ -82,15 +84,6 @@ class PhaseNet(Network):
         confidence, counts = output.softmax(1).max(1)
         wrapped_m = wrapped_distance_m(sensed, sensor)
         return Prediction(wrapped_m + counts * self.settings.unambiguous_m, confidence)
-
-    def wrap_counts(self, true_m: Tensor, wrapped_m: Tensor) -> Tensor:
-        """Whole wraps between measured and true distance, int64; the last class is all beyond.
-
-        Counted from the measured phase, as the paper's, and not from the truth, so that noise next
-        to a wrap does not cost a whole one.
-        """
-        counts = nearest_wraps(true_m, wrapped_m, self.settings.unambiguous_m)
-        return counts.long().clamp(max=self.settings.classes - 1)
 
 
 def _twice(inputs: int, outputs: int) -> nn.Sequential:

@@ -1,4 +1,4 @@
-"""What the peer networks share: sample planes, masked means, agreement with the phase."""
+"""What the peer networks share: samples as input maps, agreement with the measured phase."""
 
 from __future__ import annotations
 
@@ -8,36 +8,40 @@ import torch
 from torch import Tensor
 
 from unwrap.depth import nearest_wraps
-from unwrap.networks import Prediction, compressed
+from unwrap.networks import Prediction, log_snr
 from unwrap.signal import (
     SAMPLES_PER_FREQUENCY,
     Sensed,
     SensorDescription,
     first_phase,
-    noise_of,
-    samples_of,
+    sample_noise_lsb,
     unambiguous_range_m,
     wrapped_distance_m,
 )
 
 PLANES = SAMPLES_PER_FREQUENCY + 3
-"""Maps that `sample_planes` gives."""
+"""Maps of `sample_planes`: four samples, amplitude, saturation, how many samples."""
 
 
 def sample_planes(sensed: Sensed, sensor: SensorDescription) -> Tensor:
     """Samples at f1 over their amplitude, and what says how far to trust them.
 
-    The samples are turned by what is known of wiggle and drift: D_k is A cos(phi - k pi / 2) of the
-    corrected phase plus the half sum of its pair of opposite samples, which is 0 but for noise,
-    motion and saturation. Two samples leave the last two planes 0.
+    The samples are made anew with the phase corrected for wiggle and drift: D_k is
+    A cos(phi - k pi / 2), plus half the sum of D_k and its opposite, D_k+2, which is 0 but for
+    noise, motion and saturation. Two samples have no opposites, and leave the third and fourth
+    map 0.
 
     Returns
     -------
     float32 [B, 7, H, W]
-        Four samples over amplitude, in about [-2, 2]; compressed amplitude over noise, see
-        `unwrap.networks.phase_maps.compressed`; saturation, 0 or 1; 1 with four samples, 0 with two.
+        Four samples over amplitude, in about [-2, 2]; amplitude over noise, see
+        `unwrap.networks.input_maps.log_snr`; saturation, 0 or 1; 1 with four samples, 0 with two.
     """
-    frame, noise, raw = first_phase(sensed, sensor), noise_of(sensed, sensor), samples_of(sensed)
+    frame, noise, raw = (
+        first_phase(sensed, sensor),
+        sample_noise_lsb(sensed, sensor),
+        sensed.require_raw(),
+    )
     samples = raw.dcs_lsb[:, :SAMPLES_PER_FREQUENCY]
     planes = frame.phase_rad.new_zeros(len(samples), PLANES, *samples.shape[-2:])
     for k in range(samples.shape[1]):
@@ -48,17 +52,12 @@ def sample_planes(sensed: Sensed, sensor: SensorDescription) -> Tensor:
         common = (samples + samples.roll(2, 1)) / 2
         planes[:, :4] += (common / (frame.amplitude + noise).unsqueeze(1)).clamp(-1, 1)
         planes[:, 6] = 1.0
-    planes[:, 4] = compressed(frame.amplitude / noise)
+    planes[:, 4] = log_snr(frame.amplitude / noise)
     planes[:, 5] = raw.saturated
     return planes.contiguous(memory_format=torch.channels_last)
 
 
-def mean_of_known(values: Tensor, known: Tensor) -> Tensor:
-    """Mean of `values` where the bool `known` of their shape holds; 0 where it holds nowhere."""
-    return values.where(known, 0.0).sum() / known.sum().clamp(min=1)
-
-
-def judged(distance_m: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
+def with_agreement(distance_m: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
     """A regressed distance, with its agreement with the measured phase as confidence.
 
     The confidence is 1 where the distance is a wrap candidate of the phase and 0 halfway between

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Self
 
 import torch
 from torch import Tensor, nn
@@ -17,9 +16,10 @@ from unwrap.networks import (
     Settings,
     convolution,
     doubling,
+    masked_mean,
     pad,
 )
-from unwrap.networks.peers.planes import PLANES, judged, mean_of_known, sample_planes
+from unwrap.networks.peers.planes import PLANES, sample_planes, with_agreement
 from unwrap.signal import Sensed, SensorDescription, Truth
 
 RESIDUAL_BLOCKS = 4
@@ -56,11 +56,6 @@ class SuNet(Network):
         # The last doubling rearranges channels into 2 x 2 pixels.
         self.head = nn.Conv2d(width, 4, 1)
 
-    @classmethod
-    def build(cls, settings: Settings) -> Self:
-        """Untrained."""
-        return cls(settings)
-
     def features(self, sensed: Sensed, sensor: SensorDescription) -> Tensor:
         """See `sample_planes`."""
         return sample_planes(sensed, sensor)
@@ -90,12 +85,12 @@ class SuNet(Network):
             output / self.settings.range_m,
             truth.distance_m / self.settings.range_m,
         )
-        error = mean_of_known((prediction - target).abs(), truth.known)
+        error = masked_mean((prediction - target).abs(), truth.known)
         return error + SMOOTHNESS * smoothness(prediction, target, truth.known)
 
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
-        """The distance; its confidence is its agreement with the measured phase, see `judged`."""
-        return judged(output, sensed, sensor)
+        """The distance; for its confidence see `with_agreement`."""
+        return with_agreement(output, sensed, sensor)
 
 
 def smoothness(prediction: Tensor, target: Tensor, known: Tensor) -> Tensor:
@@ -108,5 +103,5 @@ def smoothness(prediction: Tensor, target: Tensor, known: Tensor) -> Tensor:
         step, true_step = prediction.diff(dim=axis).abs(), target.diff(dim=axis).abs()
         size = known.shape[axis] - 1
         both = known.narrow(axis, 0, size) & known.narrow(axis, 1, size)
-        total = total + mean_of_known(step * torch.exp(-true_step), both)
+        total = total + masked_mean(step * torch.exp(-true_step), both)
     return total

@@ -1,16 +1,17 @@
-"""Memory that tensors gave back is there for the next ones."""
+"""What is changed of the whole process: freed memory is kept, threads are set for a while."""
 
 import subprocess
 import sys
 
 import pytest
+import torch
 
-from unwrap.training.allocator import keep_freed_memory
+from unwrap.support.process_state import keep_freed_memory, torch_threads
 
 PAGES = """
 import resource, sys
 import torch
-from unwrap.training.allocator import keep_freed_memory
+from unwrap.support.process_state import keep_freed_memory
 if sys.argv[1] == "keep":
     keep_freed_memory()
 def use():
@@ -40,3 +41,11 @@ def test_freed_memory_is_used_again():
 def test_other_systems_are_left_alone(monkeypatch):
     monkeypatch.setattr(sys, "platform", "darwin")
     assert not keep_freed_memory()
+
+
+def test_threads_are_those_of_before_behind_the_context():
+    before = torch.get_num_threads()
+    with pytest.raises(KeyError), torch_threads(before + 1):
+        assert torch.get_num_threads() == before + 1
+        raise KeyError
+    assert torch.get_num_threads() == before

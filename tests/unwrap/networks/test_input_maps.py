@@ -1,4 +1,4 @@
-"""What networks see of samples, against closed forms."""
+"""What networks are given, against closed forms."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 import torch
 from peer_scenes import SENSOR, SPEED_OF_LIGHT_M_S, UNAMBIGUOUS_M, samples, steps
 
-from unwrap.networks.phase_maps import compressed, phase_maps
+from unwrap.networks.input_maps import gray_maps, log_snr, phase_maps
 from unwrap.signal.frames import RawFrame
 from unwrap.signal.sensed import Sensed, wrapped_distance_m
 
@@ -50,7 +50,7 @@ def test_wrapped_distance_lies_within_one_unambiguous_range():
 
 def test_compression_grows_and_stays_near_one():
     ratios = torch.tensor([0.0, 1.0, 30.0, 1000.0, 3000.0])
-    values = compressed(ratios)
+    values = log_snr(ratios)
     assert (values.diff() > 0).all()
     assert values[0] == -1.0 and values[-1] == pytest.approx(1.0, abs=0.01)
 
@@ -58,3 +58,12 @@ def test_compression_grows_and_stays_near_one():
 def test_frames_without_samples_are_refused():
     with pytest.raises(ValueError, match=r"sensed\.raw is None; expected 2, 4 or 8 samples"):
         phase_maps(Sensed(torch.zeros(1, 8, 8)), SENSOR)
+
+
+def test_gray_maps_are_gray_its_logarithm_and_the_row_within_one():
+    gray = torch.tensor([0.0, 0.5, 1.0]).expand(2, 1, 5, 3)
+    maps = gray_maps(gray)
+    assert maps.shape == (2, 3, 5, 3)
+    assert maps[0, 0, 0].tolist() == [-1.0, 0.0, 1.0]
+    assert maps[0, 1, 0].diff().min() > 0 and maps.abs().max() <= 1.001
+    assert maps[0, 2, :, 0].tolist() == [-1.0, -0.5, 0.0, 0.5, 1.0]
