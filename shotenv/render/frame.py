@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # Worker processes start without loading how worlds are drawn
 
 @dataclass(frozen=True)
 class RenderedFrame:
-    """Noise-free light of one frame; the arrays of `shotenv.sensor.exposure.Exposure` without a batch.
+    """Noise-free light of one frame: the arrays of `shotenv.sensor.Exposure` without a batch.
 
     Attributes
     ----------

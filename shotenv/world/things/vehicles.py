@@ -15,7 +15,7 @@ Profile = list[tuple[float, float]]
 
 @dataclass(frozen=True)
 class CarShape:
-    """Outline of a car in metres: lower body and cabin as (x, z) profiles."""
+    """Outline of a car in metres: lower body and cabin as (x, z) profiles, counter-clockwise."""
 
     length: float
     width: float

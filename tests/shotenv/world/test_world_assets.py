@@ -5,7 +5,7 @@ from inspect import signature
 
 import numpy as np
 import pytest
-from drawn_worlds import a_box
+from drawn_worlds import plain_box
 
 from shotenv.world.families import construction, forest, snow, warehouse
 from shotenv.world.geometry import materials as m, meshes
@@ -73,7 +73,7 @@ def test_assets_stand_on_the_ground(name):
 def test_solids_have_their_volume_and_face_outwards():
     rng = np.random.default_rng(0)
     solids = {
-        1.0 * 2.0 * 3.0: a_box((1.0, 2.0, 3.0)),
+        1.0 * 2.0 * 3.0: plain_box((1.0, 2.0, 3.0)),
         0.5 * 8 * np.sin(2 * np.pi / 8) * 0.25 * 2.0: meshes.rod(
             (0, 0, 1), (2, 0, 1), 0.5, m.SOIL.draw(rng)
         ),

@@ -4,13 +4,14 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from drawn_worlds import CLIP, EVERY, drawn_worlds, numbers
+from drawn_worlds import CLIP, EVERY, arrays_of, drawn_worlds
 
 from shotenv.config.families import FAMILIES
 from shotenv.config.reader import find_config, read_config
 from shotenv.config.sensor import SensorConfig
 from shotenv.sensor.electrons import electrons_per_radiance_second
-from shotenv.world.draw import SETTINGS, draw_world
+from shotenv.world.draw import draw_world
+from shotenv.world.families.settings import SETTINGS
 from shotenv.world.geometry import lights, materials as m, meshes, weather
 from shotenv.world.things import furniture
 
@@ -101,7 +102,7 @@ def bench_mesh():
 
 def test_dry_weather_changes_nothing(bench_mesh):
     dry = weather.weathered(bench_mesh, weather.DRY)
-    assert all((a == b).all() for a, b in zip(numbers(dry), numbers(bench_mesh), strict=True))
+    assert all((a == b).all() for a, b in zip(arrays_of(dry), arrays_of(bench_mesh), strict=True))
 
 
 def test_wet_ground_is_darker_and_mirrors():
