@@ -50,6 +50,7 @@ class FrameRenderer:
 
     def __init__(self, world: World, sensor: SensorConfig) -> None:
         start_mitsuba()
+        # Not at the top: what only plans or reads banks starts without Mitsuba.
         from shotenv.render.scene import Surroundings
 
         self._world, self._sensor, self._surroundings = world, sensor, Surroundings(world)

@@ -124,6 +124,7 @@ def excavator(rng: np.random.Generator) -> Mesh:
     wrist = (elbow[0] + 1.0 * reach, 1.0 + lift)
     bucket = [(-0.5, 0.05), (0.1, 0.0), (0.35, 0.5), (0.1, 0.85)]
     parts = [
+        # Tracks, undercarriage, upper structure, cab with its panes, boom, arm, bucket.
         *(meshes.at(meshes.extrude(track, 0.5, dark), 0.0, y) for y in (-0.95, 0.95)),
         meshes.box((1.6, 1.5, 0.35), dark, (0.0, 0.0, 0.5)),
         meshes.box((2.0, 2.2, 0.8), paint, (-0.7, 0.0, 0.86)),

@@ -172,6 +172,7 @@ def put_pillars(
     site: Site, rng: np.random.Generator, end: float, y: float, every_m: float, height: float
 ) -> None:
     """A line of equal pillars."""
+    # One draw for all: pillars of a garage are alike.
     mesh = buildings.pillar(rng, height)
     for x in np.arange(rng.uniform(0.5, 3.0), end - 0.5, every_m):
         site.put(mesh, x, y)
@@ -220,6 +221,8 @@ def lay_out_tunnel(site: Site, rng: np.random.Generator) -> None:
     build_tube(site, rng, section, centre, exit_x)
     build_tunnel_road(site, rng, centre, half, lane, exit_x)
     height = max(z for _, z in section)
+    # From floor to crown, although the vault is narrower above: renderers aim at a rectangle, and
+    # what meets the lining instead is in shadow.
     site.indoor = Indoor(
         (-BEHIND_M, centre - half, -1.0),
         (exit_x, centre + half, height),

@@ -78,6 +78,7 @@ def trunk(rng: np.random.Generator) -> Mesh:
         meshes.rod((0, 0, z), (0.7 * np.cos(a), 0.7 * np.sin(a), z + 0.15), 0.02, bark, sections=3)
         for a, z in zip(turn, rng.uniform(1.2, 4.0, 3), strict=True)
     ]
+    # 20 faces are enough so high up; a wood has many trunks.
     crown = meshes.scaled(meshes.blob(rng, 1.0, leaves, (0.0, 0.0, 0.0), 0), (1.9, 1.9, 1.3))
     return meshes.join([meshes.lathe(profile, bark, sections=7), *stubs,
                         meshes.at(crown, 0.0, 0.0, high)])  # fmt: skip
