@@ -1,4 +1,4 @@
-"""Run every benchmark and write `benchmarks/results.json`."""
+"""Run the benchmarks and write their rows to `benchmarks/results.json`."""
 
 from __future__ import annotations
 
@@ -7,16 +7,36 @@ import importlib
 import json
 from pathlib import Path
 
+import benchmarks
 from benchmarks.rows import printed
 
 BENCHMARKS = ("stepping", "sensing", "rendering", "networks")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", default=BENCHMARKS, help=f"some of {BENCHMARKS}")
-    parser.add_argument("--json", type=Path, default=Path(__file__).parent / "results.json")
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks",
+        description=benchmarks.__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        default=BENCHMARKS,
+        help=f"some of {', '.join(BENCHMARKS)}; all of them by default",
+    )
+    parser.add_argument(
+        "--json",
+        type=Path,
+        default=Path(__file__).parent / "results.json",
+        help="where the rows are written: name, ratio, bound, goal, holds, note",
+    )
     arguments = parser.parse_args()
+    # Not by `choices`: with none named, argparse takes the default for one name and refuses it.
+    for name in arguments.names:
+        if name not in BENCHMARKS:
+            parser.error(f"NAME is {name!r}; expected one of {', '.join(BENCHMARKS)}")
     rows = []
     for name in arguments.names:
         rows += importlib.import_module(f"benchmarks.{name}").run()

@@ -17,15 +17,12 @@ from torch import Tensor
 
 from benchmarks.rows import row
 from benchmarks.turns import alternately
+from unwrap.networks import Settings, Unwrapper, build_network, load_unwrapper, save_weights
 from unwrap.networks.engines import Engine
-from unwrap.networks.network import Settings, arithmetic
-from unwrap.networks.predictor import Unwrapper, load_unwrapper
-from unwrap.networks.registry import build_network
-from unwrap.networks.weight_files import save_weights
-from unwrap.signal.description import SensorDescription
-from unwrap.signal.sensed import Sensed, Truth
+from unwrap.networks.network import arithmetic
+from unwrap.signal import Sensed, SensorDescription, Truth
 from unwrap.support.process_state import keep_freed_memory
-from unwrap.training.config import TrainConfig
+from unwrap.training import TrainConfig
 from unwrap.training.loop import TrainingModule
 
 HEIGHT, WIDTH, CHANNELS = 240, 320, 64

@@ -9,20 +9,24 @@ import torch
 
 from benchmarks.rows import row
 from benchmarks.turns import alternately
-from shotenv.config.reader import find_config, read_config
-from shotenv.config.sensor import SensorConfig
-from shotenv.sensor import acquire
-from shotenv.sensor.acquisition import light_of, sensitivity
-from shotenv.sensor.exposure import Exposure
-from shotenv.sensor.noise import Purpose, noise_samples, stream
-from shotenv.sensor.offsets import draw_offsets
-from unwrap.signal.decoding import decode
-from unwrap.signal.frequencies import unambiguous_range_m
-from unwrap.signal.shots import (
+from shotenv.config import SensorConfig, find_config, read_config
+from shotenv.sensor import (
+    Exposure,
+    Purpose,
+    acquire,
+    draw_offsets,
+    light_of,
+    noise_samples,
+    sensitivity,
+    stream,
+)
+from unwrap.signal import (
     SAMPLES_PER_FREQUENCY,
     Shots,
+    decode,
     demodulation_phase_rad,
     frequency_index,
+    unambiguous_range_m,
 )
 
 HEIGHT, WIDTH = 240, 320

@@ -15,14 +15,12 @@ import torch
 from benchmarks.rows import row
 from benchmarks.turns import alternately
 from shotenv.bank.store import write_clip, write_manifest
-from shotenv.config.keywords import env_config
-from shotenv.decision.problem import open_problem
-from shotenv.decision.transition import reset, step
-from shotenv.env.vector import ShotScheduleVectorEnv
-from shotenv.sensor.noise import noise_samples
-from unwrap.networks.tofregnet import TofRegNet
-from unwrap.networks.weight_files import save_weights
-from unwrap.signal.shots import Shots
+from shotenv.config import env_config
+from shotenv.decision import open_problem, reset, step
+from shotenv.env import ShotScheduleVectorEnv
+from shotenv.sensor import noise_samples
+from unwrap.networks import TofRegNet, save_weights
+from unwrap.signal import Shots
 
 HEIGHT, WIDTH, FRAMES = 120, 160, 16
 REPEATS = 100

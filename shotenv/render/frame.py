@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # Worker processes start without loading how worlds are drawn
 
 @dataclass(frozen=True)
 class RenderedFrame:
-    """Noise-free light of one frame; the arrays of `shotenv.sensor.exposure.Exposure` without a batch.
+    """Noise-free light of one frame: the arrays of `shotenv.sensor.Exposure` without a batch.
 
     Attributes
     ----------
@@ -50,6 +50,7 @@ class FrameRenderer:
 
     def __init__(self, world: World, sensor: SensorConfig) -> None:
         start_mitsuba()
+        # Not at the top: what only plans or reads banks starts without Mitsuba.
         from shotenv.render.scene import Surroundings
 
         self._world, self._sensor, self._surroundings = world, sensor, Surroundings(world)

@@ -94,27 +94,41 @@ def rotation(pose: Pose) -> np.ndarray:
 def faces_of(world: World) -> Faces:
     """The triangles of `world`."""
     moving = [thing.mesh for thing in world.moving]
-    # A mesh cannot be empty.
+    # A mesh cannot be empty, and without it the kernel would be another one.
     moving = moving if any(len(mesh.corners) for mesh in moving) else [_nothing(world)]
     meshes, still = [world.static, *moving], world.static.corners
+
+    def columns(*names: str) -> Array:
+        """Numbers of all faces, float32 [S + M, names]."""
+        return np.stack([np.concatenate([getattr(m, name) for m in meshes]) for name in names], 1)
+
     normals = np.zeros((len(still), 4), np.float32)
     _find_normals(still.astype(float), normals)
+    first, second, third = np.moveaxis(np.concatenate([mesh.uv for mesh in meshes]), 1, 0)
+    farthest = [np.linalg.norm(mesh.corners, axis=-1).max(initial=0.0) for mesh in moving]
     return Faces(
         still=len(still),
         corners=np.concatenate([mesh.corners for mesh in meshes]),
         thing=np.repeat(np.arange(len(moving)), [len(mesh.corners) for mesh in moving]),
-        radius_m=np.array([_radius_m(mesh) for mesh in moving]),
+        radius_m=np.array(farthest, np.float64),
         normals=normals,
-        surface=np.concatenate([_surface(mesh) for mesh in meshes]),
-        uv=np.concatenate([_edges_uv(mesh) for mesh in meshes]),
+        # Four and eight numbers in a row: a face's are gathered as one or two packets of four.
+        surface=columns("albedo_low", "albedo_high", "retro", "emission"),
+        uv=np.concatenate([first, second - first, third - first, columns("mirror", "clear")], 1),
     )
 
 
 def posed(world: World, faces: Faces, times_s: Sequence[float], bounces: int) -> Posed:
     """The moving ones of `faces` at `times_s` for light paths of at most `bounces` surface hits."""
-    own, (turns, places) = faces.corners[faces.still :], _poses(world, times_s)
+    own = faces.corners[faces.still :]
+    motions = [thing.motion for thing in world.moving] or [Motion(Pose((0.0, 0.0, 0.0)))]
+    poses = [[motion.at(time_s) for motion in motions] for time_s in times_s]
+    turns = np.array([[rotation(pose) for pose in row] for row in poses])
+    places = np.array([[pose.position_m for pose in row] for row in poses])
     corners = np.empty((len(times_s), *own.shape), np.float32)
     normals = np.zeros((*corners.shape[:2], 4), np.float32)
+    # No ray gets further from the camera than a leg per surface hit and one to a light, each of
+    # `REACH_M`; no copy gets further than its place and its own size.
     away_m = np.abs(places - world.ego.at(times_s[0]).position_m)[..., :2].max(axis=-1)
     farthest_m = float((away_m + faces.radius_m).max())
     tile_m = tile_grid(len(times_s), spacing_m=farthest_m + (bounces + 1) * REACH_M)
@@ -125,23 +139,11 @@ def posed(world: World, faces: Faces, times_s: Sequence[float], bounces: int) ->
     return Posed(corners, normals, panes.reshape(-1, 3, 3), tile_m.astype(np.float32))
 
 
-def _radius_m(mesh: Mesh) -> float:
-    return float(np.linalg.norm(mesh.corners, axis=-1).max(initial=0.0))
-
-
-def _poses(world: World, times_s: Sequence[float]) -> tuple[Array, Array]:
-    """Rotations [T, K, 3, 3] and places [T, K, 3] of the things that move; K is at least one."""
-    motions = [thing.motion for thing in world.moving] or [Motion(Pose((0.0, 0.0, 0.0)))]
-    poses = [[motion.at(time_s) for motion in motions] for time_s in times_s]
-    turns = [[rotation(pose) for pose in row] for row in poses]
-    places = [[pose.position_m for pose in row] for row in poses]
-    return np.array(turns), np.array(places)
-
-
 def tile_grid(count: int, spacing_m: float) -> np.ndarray:
     """Offsets [count, 3] on a square grid about the origin, metres; spacing in whole metres."""
     side = math.ceil(math.sqrt(count))
     row, column = np.divmod(np.arange(count), side)
+    # About the origin and in whole metres: float32 corners keep most digits of what is small.
     offsets = np.stack([column - (side - 1) / 2, row - row.max() / 2, np.zeros(count)], axis=1)
     return offsets * math.ceil(spacing_m)
 
@@ -221,14 +223,3 @@ def _nothing(world: World) -> Mesh:
     corners = np.broadcast_to(buried.astype(np.float32), (1, 3, 3))
     uv = np.zeros((1, 3, 2), np.float32)
     return Mesh(corners, uv, zero, zero, zero, zero, zero, zero)
-
-
-def _surface(mesh: Mesh) -> np.ndarray:
-    columns = (mesh.albedo_low, mesh.albedo_high, mesh.retro, mesh.emission)
-    return np.stack(columns, axis=1).astype(np.float32)
-
-
-def _edges_uv(mesh: Mesh) -> np.ndarray:
-    first, second, third = np.moveaxis(mesh.uv.astype(np.float32), 1, 0)
-    shares = np.stack([mesh.mirror, mesh.clear], axis=1).astype(np.float32)
-    return np.concatenate([first, second - first, third - first, shares], axis=1)

@@ -1,4 +1,9 @@
-"""When light is gathered for a frame: the instants that one launch of the integrator renders."""
+"""When light is gathered for a frame: the instants that one launch of the integrator renders.
+
+A frame takes eight samples one after the other, and everything moves in between; before them the
+gray exposure is averaged over a few instants. All are rendered in one launch, since each launch
+costs its start and its copies, which on a small image weigh beside the rays.
+"""
 
 from __future__ import annotations
 
@@ -45,8 +50,9 @@ def frame_instants(
 ) -> Instants:
     """Instants of a frame that starts at `time_s`: eight samples, then the gray exposure.
 
-    The samples start at the times of `unwrap.signal.shots`; the gray instants are the midpoints of
-    equal parts of the gray exposure (None: the longest), which ends where the first sample starts.
+    The samples start at the times of `unwrap.signal.sample_times_s`; the gray instants are the
+    midpoints of equal parts of the gray exposure (None: the longest), which ends where the first
+    sample starts.
     """
     samples = [time_s + t for t in sample_times_s(Shots.EIGHT, sensor.sample_period_s)]
     frequencies_hz = (sensor.f1_hz, sensor.f2_hz)
@@ -61,6 +67,9 @@ def frame_instants(
         times_s=(*samples, *gray),
         laser=laser,
         passive=tuple(not on for on in laser),
+        # Samples of one frame differ by what moved, and by the sensor's noise, not by Monte Carlo
+        # noise: that would be as large, and look like motion. Gray instants are averaged: theirs
+        # should differ.
         draw=(0,) * len(samples) + tuple(range(gray_count)),
         frequency_hz=(*sample_hz, *unmodulated),
         theta_rad=(*theta_rad, *unmodulated),

@@ -28,6 +28,7 @@ from shotenv.render.scene import SURFACE_OFFSET_M, Hit, Scene, Surroundings
 from shotenv.world.geometry import World
 
 _RETRO_COS = 0.5
+"""Cosine of the steepest incidence at which surfaces retro-reflect: 60 degrees, assumed."""
 
 
 @dataclass(frozen=True)
@@ -67,13 +68,13 @@ def trace(
     """Trace `camera.samples_per_pixel` paths per pixel and instant, in one kernel launch.
 
     The laser sits at the camera and shines evenly over the field of view. `harmonics` are those
-    of the correlation, see `unwrap.signal.shots.harmonic_weights`; `surroundings` are those of the
+    of the correlation, see `unwrap.signal.harmonic_weights`; `surroundings` are those of the
     same world, where frames of it have been traced before. The result depends on the arguments
     alone, bit for bit on one machine.
     """
     lanes = Lanes.of(len(instants), camera)
     eye = Pinhole(world.ego, instants, camera)
-    lights = _Lights(
+    sources = _Sources(
         eye,
         PassiveLight(world, instants),
         Modulation(instants, harmonics, lanes.instant),
@@ -83,12 +84,12 @@ def trace(
     surroundings = Surroundings(world) if surroundings is None else surroundings
     scene = Scene(surroundings, posed(world, surroundings.faces, instants.times_s, camera.bounces))
     sampler = Sampler(lanes, instants, camera, seed=seed)
-    light = _follow(scene, lights, lanes, camera.bounces, sampler)
-    return _collect(light, lanes, len(instants), camera)
+    gathered = _follow(scene, sources, lanes, camera.bounces, sampler)
+    return _collect(gathered, len(instants), camera)
 
 
 @dataclass(frozen=True)
-class _Lights:
+class _Sources:
     """The laser (at the eye), the passive lights, and which lanes each of them reaches."""
 
     eye: Pinhole
@@ -99,7 +100,7 @@ class _Lights:
 
 
 @dataclass
-class _Light:
+class _Gathered:
     """What the lanes have gathered so far."""
 
     modulation: Modulation
@@ -146,32 +147,41 @@ class _Onward:
         )
 
 
-def _follow(scene: Scene, lights: _Lights, lanes: Lanes, bounces: int, sampler: Sampler) -> _Light:
+def _follow(
+    scene: Scene, sources: _Sources, lanes: Lanes, bounces: int, sampler: Sampler
+) -> _Gathered:
     """Walk every lane's path from the camera, adding the light of each surface hit."""
-    passive, instant = lights.passive, lanes.instant
-    origin, direction = lights.eye.rays(lanes, sampler.next_2d())
+    passive, instant = sources.passive, lanes.instant
+    origin, direction = sources.eye.rays(lanes, sampler.next_2d())
     hit = scene.hit(origin, direction, instant, mi.Bool(True), coherent=True)
-    light = _Light(
-        modulation=lights.modulation,
+    light = _Gathered(
+        modulation=sources.modulation,
         distance_m=dr.select(hit.valid, hit.distance_m, dr.inf),
-        ambient=dr.select(lights.passive_on & ~hit.valid, passive.sky(direction), 0),
+        ambient=dr.select(sources.passive_on & ~hit.valid, passive.sky(direction), 0),
         active=mi.Float(0),
         correlation=mi.Float(0),
     )
     throughput, walked_m = mi.Float(1), hit.distance_m
     # Share of the laser's light on the way that the camera looks; 0 once that way has scattered.
-    way_back, bent, seeks_sky = mi.Float(1), mi.Bool(False), lights.passive_on
+    # `bent`: a mirror or a diffuse surface lies behind, so that the laser shines on the next one
+    # by another way than the camera looks. `seeks_sky`: a ray that meets nothing sees the sky,
+    # which no aimed ray has counted already.
+    way_back, bent, seeks_sky = mi.Float(1), mi.Bool(False), sources.passive_on
+    # A Python loop: each bounce is traced into the one kernel, which knows the first and the last.
     for bounce in range(bounces):
-        laser_on, passive_on = hit.valid & lights.laser_on, hit.valid & lights.passive_on
-        returned = _laser_returned(lights.eye, hit, direction, walked_m)
+        laser_on, passive_on = hit.valid & sources.laser_on, hit.valid & sources.passive_on
+        returned = _laser_along_view(sources.eye, hit, direction, walked_m)
         returned = dr.select(laser_on, throughput * way_back * returned, 0)
         light.add_active(returned, 2 * walked_m)
         if bounce > 0:
-            radiance, leg_m = _laser(scene, lights.eye, hit, instant, laser_on & bent)
+            radiance, leg_m = _laser_straight(scene, sources.eye, hit, instant, laser_on & bent)
             light.add_active(throughput * radiance, walked_m + leg_m)
+        # Faces of lamps glow for the camera and its mirrors alone: what they shine on others is
+        # the `Lamp`'s, and would be counted twice.
         glow = dr.select(passive_on & (way_back > 0), hit.emission, 0)
         light.ambient += throughput * glow
 
+        # Every lane draws all numbers at each surface, used or not, so that lanes stay in step.
         aim, which = sampler.next_2d(), sampler.next_1d()
         number, sample = sampler.next_1d(), sampler.next_2d()
         onward = _Onward.drawn(hit, direction, number, sample)
@@ -193,13 +203,14 @@ def _follow(scene: Scene, lights: _Lights, lanes: Lanes, bounces: int, sampler: 
             walked_m += dr.norm(hit.point - previous.point)
             free = dr.select(seeks_sky & ~hit.valid, 1, 0)
         else:
+            # Nothing is seen of a surface beyond the last bounce: whether the sky is, is enough.
             reach = mi.Float(REACH_M)
             free = scene.transmission(onward.start, direction, reach, instant, seeks_sky)
         light.ambient += throughput * dr.fma(irradiance, dr.inv_pi, passive.sky(direction) * free)
     return light
 
 
-def _laser_returned(eye: Pinhole, hit: Hit, direction, distance_m):
+def _laser_along_view(eye: Pinhole, hit: Hit, direction, distance_m):
     """Radiance per watt of the laser's light that came the way that the camera looks.
 
     Mirrors fold that way and panes dim it, but nothing else can stand on it. Surfaces that it
@@ -210,7 +221,7 @@ def _laser_returned(eye: Pinhole, hit: Hit, direction, distance_m):
     return _reflected(hit, eye.intensity, cosine, distance_m) * (1 + retro)
 
 
-def _laser(scene: Scene, eye: Pinhole, hit: Hit, instant, active):
+def _laser_straight(scene: Scene, eye: Pinhole, hit: Hit, instant, active):
     """Radiance per watt of the laser's light that came straight, and its distance."""
     intensity, direction, distance = eye.laser(hit.point, instant)
     cosine = dr.maximum(dr.dot(hit.normal, direction), 0)
@@ -226,10 +237,11 @@ def _reflected(hit: Hit, intensity, cosine, distance_m):
     return hit.diffuse * hit.albedo * dr.inv_pi * intensity * cosine / dr.square(distance_m)
 
 
-def _collect(light: _Light, lanes: Lanes, instants: int, camera: CameraConfig) -> Traced:
-    """Mean over the samples of each pixel; distances are those of sample 0."""
+def _collect(light: _Gathered, instants: int, camera: CameraConfig) -> Traced:
+    """Mean over the samples of each pixel; distances are those of sample 0, through its centre."""
     samples = camera.samples_per_pixel
     first = dr.arange(mi.UInt32, instants * camera.width * camera.height) * samples
+    # The launch; the sums read other lanes, and so make a second, small kernel.
     dr.eval(light.distance_m, light.ambient, light.active, light.correlation)
     images = [
         dr.gather(mi.Float, light.distance_m, first),
@@ -244,9 +256,11 @@ def _collect(light: _Light, lanes: Lanes, instants: int, camera: CameraConfig) -
 
 
 def _sum(values, first, count: int):
-    """Sums of `count` neighbours, halves on halves; several times as fast as `dr.block_sum`.
+    """Sums of `count` neighbours, halves on halves: what `dr.block_sum` gives, but sooner.
 
-    To the last bit what that gives of 4, down to the sign of zero.
+    On two cores, three sums of 12 instants of 160 x 120 pixels and 4 samples take 0.2 ms, against
+    14 ms by `dr.block_sum`. Of 4 samples both give the same to the last bit, down to the sign of
+    zero.
     """
     parts = [dr.gather(mi.Float, values, first + i) for i in range(count)]
     while len(parts) > 1:

@@ -21,6 +21,7 @@ from shotenv.render.scene import Hit, Scene
 from shotenv.world.geometry import MAX_LAMPS, Indoor, Lamp, World
 
 _LAMP_NUMBERS = 12
+"""Numbers of a lamp: three packets of four, as they are gathered."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,8 @@ class PassiveLight:
 
     def __init__(self, world: World, instants: Instants):
         light = world.light
+        # Numbers are made opaque: Dr.Jit would compile a plain one into the kernel as a constant,
+        # and every world would wait for a kernel of its own.
         self._lamps = upload(np.stack([lamp_table(world, t) for t in instants.times_s]))
         self._lamp_count = dr.opaque(mi.UInt32, len(light.lamps))
         self._opening = _Opening(light.indoor)
@@ -89,7 +92,11 @@ class PassiveLight:
         Indoors, daylight comes through the opening: the sky is sampled there, and one of sun and
         sky is drawn in proportion to their unshadowed irradiance.
         """
-        choice = self._sky_through_opening(hit, aim, number)
+        direction, solid_angle = self._opening.aim(hit.point, aim)
+        cosine = dr.maximum(dr.dot(hit.normal, direction), 0)
+        above = self._opening.is_far(hit.point) & (direction.z > 0)
+        sky = dr.select(above, self.sky(direction) * cosine * solid_angle, 0)
+        choice = _Choice(sky, direction, mi.Float(REACH_M), number)
         sun = self._sun_irradiance * dr.maximum(dr.dot(hit.normal, self._sun_direction), 0)
         sun = dr.select(self._opening.lets_in(hit.point, self._sun_direction), sun, 0)
         choice = choice.offer(sun, self._sun_direction, mi.Float(REACH_M))
@@ -101,13 +108,6 @@ class PassiveLight:
         """Whether `daylight` holds the sky's light on this surface already."""
         return self._opening.is_far(hit.point)
 
-    def _sky_through_opening(self, hit: Hit, sample, number) -> _Choice:
-        direction, solid_angle = self._opening.aim(hit.point, sample)
-        cosine = dr.maximum(dr.dot(hit.normal, direction), 0)
-        above = self._opening.is_far(hit.point) & (direction.z > 0)
-        irradiance = dr.select(above, self.sky(direction) * cosine * solid_angle, 0)
-        return _Choice(irradiance, direction, mi.Float(REACH_M), number)
-
     def lamps(self, scene: Scene, hit: Hit, instant, number, active):
         """Estimate of the lamps' irradiance on a surface, W m-2, from a random `number`.
 
@@ -115,12 +115,7 @@ class PassiveLight:
         only that one is tested for shadow: the estimate is the sum of all irradiances where the
         lamp is seen and 0 where it is not, so that no estimate exceeds what is possible.
         """
-        choice = self._choose_lamp(hit, instant, number, active)
-        lit = active & (choice.total > 0)
-        share = scene.transmission(hit.leave, choice.direction, choice.length, instant, lit)
-        return choice.total * share
 
-    def _choose_lamp(self, hit: Hit, instant, number, active) -> _Choice:
         def more(index, *_):
             return active & (index < self._lamp_count)
 
@@ -129,9 +124,13 @@ class PassiveLight:
             kept = _Choice(*state).offer(*lamp)
             return (index + 1, kept.total, kept.direction, kept.length, kept.number)
 
+        # A loop on the device: unrolled in Python, every number of lamps would be another kernel.
         start = (mi.UInt32(0), mi.Float(0), mi.Vector3f(0, 0, 1), mi.Float(0), number)
         _, *state = dr.while_loop(start, more, offer, label="lamps")
-        return _Choice(*state)
+        choice = _Choice(*state)
+        lit = active & (choice.total > 0)
+        share = scene.transmission(hit.leave, choice.direction, choice.length, instant, lit)
+        return choice.total * share
 
     def _lamp(self, row, hit: Hit, active):
         """Irradiance, direction and length of the shadow ray of one lamp at a surface."""

@@ -38,6 +38,7 @@ def odd_series(cosine, harmonics: Harmonics):
     Of the odd Chebyshev polynomials, T_(h+2) = (4 cos(x)^2 - 2) T_h - T_(h-2) and T_(-1) = T_1.
     """
     twice = 4 * cosine * cosine - 2
+    # From the highest harmonic down; one cosine per path, however many harmonics there are.
     here, above = 0.0, 0.0
     for _, weight in reversed(harmonics):
         here, above = weight + twice * here - above, here

@@ -46,6 +46,7 @@ class Pinhole:
         """Origin and direction of each lane's ray; sample 0 goes through the pixel's centre."""
         camera = self._camera
         across, down = half_extents(camera)
+        # The true distance is that of sample 0, the same for every seed.
         offset = dr.select(lanes.sample == 0, 0.5, jitter)
         column = mi.Float(lanes.pixel % camera.width) + offset.x
         row = mi.Float(lanes.pixel // camera.width) + offset.y

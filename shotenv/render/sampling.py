@@ -43,12 +43,14 @@ class Sampler:
     """
 
     def __init__(self, lanes: Lanes, instants: Instants, camera: CameraConfig, *, seed: int):
+        # Seeds are integers of any size; 32 bits of them reach every lane by way of its pixel.
         key = dr.opaque(mi.UInt32, int(np.random.SeedSequence(seed).generate_state(1)[0]))
         first, second = mi.sample_tea_32(key, lanes.pixel)
         self._rng = mi.PCG32(1, mi.UInt64(first), mi.UInt64(second))
         draw = dr.gather(mi.UInt32, mi.UInt32(list(instants.draw)), lanes.instant)
         self._index = draw * camera.samples_per_pixel + lanes.sample
         count = (max(instants.draw) + 1) * camera.samples_per_pixel
+        # XOR with a number below the next power of two shuffles and keeps the sequence's blocks.
         self._shuffle_mask = (1 << (count - 1).bit_length()) - 1
 
     def next_1d(self):

@@ -18,6 +18,8 @@ from shotenv.render.texture import noise_texture
 from shotenv.world.geometry import Light, Pose, World
 
 _NEAR_CLIP_M = 1e-5
+"""Mitsuba's camera rays start on the near plane, by default 1 cm ahead, and a time-resolved film
+would find every path shorter by that."""
 _FILM = {"type": "hdrfilm", "pixel_format": "luminance"}
 
 
@@ -45,6 +47,7 @@ def stock_scene(
 
 def stock_path(camera: CameraConfig) -> Any:
     """Mitsuba's path integrator for as many surface hits as the camera's light paths have."""
+    # `max_depth` counts path segments and not surfaces; no Russian roulette, as we have none.
     return mi.load_dict({"type": "path", "max_depth": camera.bounces + 1, "rr_depth": 1000})
 
 
@@ -56,14 +59,16 @@ def _triangles(world: World, time_s: float) -> Any:
     low, high, *_ = faces.surface.T
     return triangle_mesh(
         corners,
-        mi.load_dict(_textured()),
+        mi.load_dict(_noise_bsdf()),
         vertex_texcoords=np.stack([first, first + along, first + across], axis=1),
         face_low=low,
         face_high=high,
     )
 
 
-def _textured() -> dict[str, Any]:
+def _noise_bsdf() -> dict[str, Any]:
+    """Diffuse on both sides, its albedo between a face's two by the noise texture."""
+
     def diffuse(attribute: str) -> dict[str, Any]:
         return {"type": "diffuse", "reflectance": {"type": "mesh_attribute", "name": attribute}}
 

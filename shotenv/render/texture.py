@@ -8,6 +8,7 @@ import numpy as np
 
 RESOLUTION = 256
 _SEED = 20231
+"""Fixed: another texture would change every rendered bank."""
 _COARSEST_CELLS = 4
 _OCTAVES = 6
 
@@ -19,12 +20,13 @@ def noise_texture() -> np.ndarray:
     total = np.zeros((RESOLUTION, RESOLUTION))
     for octave in range(_OCTAVES):
         cells = _COARSEST_CELLS * 2**octave
-        total += _smooth(rng.uniform(-1.0, 1.0, (cells, cells))) * 0.6**octave
+        total += _value_noise(rng.uniform(-1.0, 1.0, (cells, cells))) * 0.6**octave
+    # Clipped at both ends, so that albedos reach the whole range that their finish gives.
     low, high = np.quantile(total, [0.01, 0.99])
     return np.clip((total - low) / (high - low), 0.0, 1.0).astype(np.float32)
 
 
-def _smooth(grid: np.ndarray) -> np.ndarray:
+def _value_noise(grid: np.ndarray) -> np.ndarray:
     """Periodic value noise: `grid` interpolated with a cubic fade to the texture's resolution."""
     cells = len(grid)
     position = (np.arange(RESOLUTION) + 0.5) * cells / RESOLUTION

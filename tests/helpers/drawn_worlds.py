@@ -26,10 +26,11 @@ def drawn_worlds():
     ]
 
 
-def numbers(mesh):
+def arrays_of(mesh):
     """Every array of a mesh."""
     return [value for value in vars(mesh).values() if isinstance(value, np.ndarray)]
 
 
-def a_box(size=(1.0, 1.0, 1.0)) -> Mesh:
+def plain_box(size=(1.0, 1.0, 1.0)) -> Mesh:
+    """A box of one plain material, standing on the origin."""
     return meshes.box(size, m.Material(0.2, 0.3))

@@ -22,7 +22,9 @@ from shotenv.render.backend.llvm import RendererError
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 CHECK_S = 1.0
+"""How often workers are looked at while none of them has anything to say."""
 STOPPED_LIMIT_S = 5.0
+"""After this long a stopped worker counts as hung."""
 
 
 def run_jobs(
@@ -67,10 +69,15 @@ def run_jobs(
             if len(crew) == workers:
                 break
         while crew:
-            for worker in _finished(crew):
+            # A pipe is ready when it has a result, or when its process is dead; a worker that is
+            # stopped keeps silent, hence the timeout.
+            ready = wait([worker.pipe for worker in crew], timeout=CHECK_S)
+            for worker in crew:
+                worker.check()
+            for worker in [worker for worker in crew if worker.pipe in ready]:
                 done = worker.take()
                 crew.remove(worker)
-                crew.extend(_continued(worker, waiting, function, threads, jobs_per_worker))
+                crew.extend(_give_next_job(worker, waiting, function, threads, jobs_per_worker))
                 yield done
     finally:
         for worker in crew:
@@ -88,12 +95,14 @@ class _Worker(Generic[Job, Result]):
     """A process with a pipe to it, and the one job that it is at."""
 
     def __init__(self, function: Callable[[Job], Result], threads: int, jobs_left: int):
+        # Not forked: threads and locks of Dr.Jit and torch do not survive it.
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
         arguments = (theirs, function, threads)
         self._process = context.Process(target=_serve, args=arguments, daemon=True)
         with nullcontext() if function.__module__ == "__main__" else _no_main_module():
             self._process.start()
+        # Closed here, so that the end of the process ends the pipe.
         theirs.close()
         self._last_seen_s = time.monotonic()
         self.jobs_left = jobs_left
@@ -160,15 +169,7 @@ class _Worker(Generic[Job, Result]):
         return textwrap.shorten(f"job {self._job!r}", 200)
 
 
-def _finished(crew: list[_Worker]) -> list[_Worker]:
-    """Workers whose pipe has something to say: a result, or that its process is dead."""
-    ready = wait([worker.pipe for worker in crew], timeout=CHECK_S)
-    for worker in crew:
-        worker.check()
-    return [worker for worker in crew if worker.pipe in ready]
-
-
-def _continued(
+def _give_next_job(
     worker: _Worker,
     waiting: Iterator[Job],
     function: Callable[[Job], Result],

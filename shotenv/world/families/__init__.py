@@ -1,4 +1,12 @@
-"""Families of scenes: how each is laid out, and its traffic."""
+"""Families of scenes: how each is laid out, and its traffic.
+
+`settings.py` has one row per family: places, light, weather. A place is laid out by a function
+`lay_out_...(site, rng)`. What changes the site is a verb: `build_...` for ground, walls and
+ceilings, which nothing keeps off; `put_...` for things that stay out of each other's way, and are
+left out where no room is free; `paint_...` for lines. What only draws a thing, and returns its
+mesh, is named after the thing. Things that other families may show as well are in
+`shotenv.world.things`; the files of held-out families have theirs to themselves.
+"""
 
 import lazy_loader
 

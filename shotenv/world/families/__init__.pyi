@@ -1,8 +1,1 @@
-from . import (
-    construction as construction,
-    enclosed as enclosed,
-    forest as forest,
-    roads as roads,
-    snow as snow,
-    warehouse as warehouse,
-)
+from .settings import SETTINGS as SETTINGS

@@ -6,46 +6,47 @@ from itertools import pairwise
 
 import numpy as np
 
-from shotenv.world.families.roads import BEHIND_M, REACH_M, puddles
-from shotenv.world.families.traffic import TRIES, one_of, row
+from shotenv.world.families.roads import BEHIND_M, REACH_M, build_puddles
+from shotenv.world.families.traffic import TRIES, draw_one, put_row
 from shotenv.world.geometry import Lamp, Mesh, Motion, Pose, Site, lights, materials as m, meshes
 from shotenv.world.things import people, wheel
 
 FLOOD_IRRADIANCE = (5e-3, 5e-2)
+"""Irradiance in band of a flood light at twice its height's distance, W m-2; an assumed range."""
 
 
-def construction_site(site: Site, rng: np.random.Generator) -> None:
+def lay_out_construction_site(site: Site, rng: np.random.Generator) -> None:
     """A haul road over bare ground between fences, machines, heaps and an unfinished building."""
     ground = (m.SOIL if rng.random() < 0.6 else m.GRAVEL).draw(rng)
     far, half = site.travel_m + REACH_M, rng.uniform(2.6, 4.2)
     site.build(meshes.patch((-BEHIND_M, far), (-REACH_M, REACH_M), 0.0, ground))
     track = m.GRAVEL.draw(rng)
     site.build(meshes.patch((-BEHIND_M, far), (-half, half), 0.004, track))
-    puddles(site, rng, (-half, half))
+    build_puddles(site, rng, (-half, half))
     if rng.random() < 0.5:
-        blocking(site, rng)
-    machines(site, rng, half)
-    crew(site, rng, half)
+        put_blockage(site, rng)
+    put_machines(site, rng, half)
+    put_crew(site, rng, half)
     side = rng.choice([-1, 1])
-    row(site, rng, lambda r: unfinished_wall(r, 6.0), side * (half + 4.5), 6.3, -side * np.pi / 2)
-    row(site, rng, scaffold, side * (half + 2.2), 2.6, -side * np.pi / 2, share=0.7, spread=0.02)
-    row(site, rng, site_fence, -side * (half + 3.0), 3.55, side * np.pi / 2, share=0.9, spread=0.1)
-    row(site, rng, stored_thing, -side * (half + 0.9), 2.6, 0.0, share=0.8, spread=0.8)
-    row(site, rng, stored_thing, side * (half + 0.6), 3.4, 0.0, share=0.6, spread=0.3)
-    row(site, rng, gravel_heap, -side * (half + 7.0), 7.0, 0.0, share=0.8, spread=1.5)
+    inwards = -side * np.pi / 2
+    put_row(site, rng, lambda r: unfinished_wall(r, 6.0), side * (half + 4.5), 6.3, inwards)
+    put_row(site, rng, scaffold, side * (half + 2.2), 2.6, inwards, share=0.7, spread=0.02)
+    put_row(site, rng, site_fence, -side * (half + 3.0), 3.55, -inwards, share=0.9, spread=0.1)
+    put_row(site, rng, stored_thing, -side * (half + 0.9), 2.6, 0.0, share=0.8, spread=0.8)
+    put_row(site, rng, stored_thing, side * (half + 0.6), 3.4, 0.0, share=0.6, spread=0.3)
+    put_row(site, rng, gravel_heap, -side * (half + 7.0), 7.0, 0.0, share=0.8, spread=1.5)
     if site.night or rng.random() < 0.3:
-        flood_light(site, rng, half)
+        put_flood_light(site, rng, half)
 
 
-def blocking(site: Site, rng: np.random.Generator) -> None:
+def put_blockage(site: Site, rng: np.random.Generator) -> None:
     """What ends the way: barrier boards, a heap or a container."""
     x = site.travel_m + 1.2 + 7.0 * rng.uniform() ** 1.5
-    things = (barrier_board, barrier_board, gravel_heap, site_container)
-    thing = one_of(rng, things)
+    thing = draw_one(rng, (barrier_board, barrier_board, gravel_heap, site_container))
     site.put(thing, x - float(thing.corners[..., 0].min()), rng.uniform(-0.8, 0.8), np.pi)
 
 
-def machines(site: Site, rng: np.random.Generator, half: float) -> None:
+def put_machines(site: Site, rng: np.random.Generator, half: float) -> None:
     """An excavator at work or parked beside the road, and perhaps a dumper on it."""
     for _ in range(rng.integers(1, 3)):
         side, digger = rng.choice([-1, 1]), excavator(rng)
@@ -57,26 +58,26 @@ def machines(site: Site, rng: np.random.Generator, half: float) -> None:
         speed = rng.uniform(1.0, 5.0) if rng.random() < 0.6 else 0.0
         x = rng.uniform(6.0, 20.0) + 0.5 * site.travel_m
         offset = rng.uniform(0.3, 1.0) * (half - 1.2)
-        site.move(dumper(rng), Motion(Pose((x, offset, 0.0), np.pi), speed))
+        site.put_moving(dumper(rng), Motion(Pose((x, offset, 0.0), np.pi), speed))
 
 
-def crew(site: Site, rng: np.random.Generator, half: float) -> None:
+def put_crew(site: Site, rng: np.random.Generator, half: float) -> None:
     """Workers who stand or walk about."""
     for _ in range(rng.integers(1, 5)):
-        somebody, speed = at_work(rng)
+        somebody, speed = passing_worker(rng)
         for _ in range(TRIES):
             place = (site.travel_m + rng.uniform(1.2, 14.0), rng.uniform(-half, half), 0.004)
-            if site.move(somebody, Motion(Pose(place, rng.uniform(-np.pi, np.pi)), speed)):
+            if site.put_moving(somebody, Motion(Pose(place, rng.uniform(-np.pi, np.pi)), speed)):
                 break
 
 
-def at_work(rng: np.random.Generator, wetness: float = 0.0) -> tuple[Mesh, float]:
-    """A worker and their speed in m/s; rain makes no difference."""
+def passing_worker(rng: np.random.Generator, wetness: float = 0.0) -> tuple[Mesh, float]:
+    """A worker who stands or walks, and their speed in m/s; rain makes no difference."""
     speed = rng.uniform(0.5, 1.6) if rng.random() < 0.6 else 0.0
     return worker(rng, people.STRIDE_S * speed), speed
 
 
-def flood_light(site: Site, rng: np.random.Generator, half: float) -> None:
+def put_flood_light(site: Site, rng: np.random.Generator, half: float) -> None:
     """A mast with lamps that look down the road; lit at night."""
     height = rng.uniform(3.5, 5.5)
     intensity = lights.intensity_for(rng, FLOOD_IRRADIANCE, 2 * height) if site.night else 0.0
@@ -90,7 +91,7 @@ def flood_light(site: Site, rng: np.random.Generator, half: float) -> None:
 
 def stored_thing(rng: np.random.Generator) -> Mesh:
     """Something that stands about on a site."""
-    return one_of(
+    return draw_one(
         rng, (pipe_stack, barrier_board, block_stack, site_container, portable_toilet, gravel_heap)
     )
 
@@ -123,6 +124,7 @@ def excavator(rng: np.random.Generator) -> Mesh:
     wrist = (elbow[0] + 1.0 * reach, 1.0 + lift)
     bucket = [(-0.5, 0.05), (0.1, 0.0), (0.35, 0.5), (0.1, 0.85)]
     parts = [
+        # Tracks, undercarriage, upper structure, cab with its panes, boom, arm, bucket.
         *(meshes.at(meshes.extrude(track, 0.5, dark), 0.0, y) for y in (-0.95, 0.95)),
         meshes.box((1.6, 1.5, 0.35), dark, (0.0, 0.0, 0.5)),
         meshes.box((2.0, 2.2, 0.8), paint, (-0.7, 0.0, 0.86)),

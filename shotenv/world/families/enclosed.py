@@ -1,4 +1,4 @@
-"""Roofed places: a parking garage and a road tunnel. The ego's way is centred on y = 0."""
+"""Roofed places: a parking garage and a road tunnel. The ego's lane is centred on y = 0."""
 
 from __future__ import annotations
 
@@ -7,60 +7,79 @@ from dataclasses import replace
 import numpy as np
 
 from shotenv.world.families.roads import BEHIND_M, PAINT_M, REACH_M
-from shotenv.world.families.traffic import approaching, crossing, lead, row, walkers
-from shotenv.world.geometry import Indoor, Lamp, Motion, Pose, Site, lights, materials as m, meshes
+from shotenv.world.families.traffic import (
+    draw_one,
+    put_approaching,
+    put_crossers,
+    put_row,
+    put_vehicle_ahead,
+    put_walkers,
+)
+from shotenv.world.geometry import (
+    Indoor,
+    Lamp,
+    Mesh,
+    Motion,
+    Pose,
+    Site,
+    lights,
+    materials as m,
+    meshes,
+)
 from shotenv.world.things import buildings, cycles, furniture, plants, vehicles
 from unwrap.support import Range
 
 TUBE_LAMP_M = 1.4
 TUBE_WIDTH_M = 0.12
+TUBE_IRRADIANCE: Range = (5e-3, 0.1)
+"""Irradiance in band straight below one ceiling lamp, W m-2; an assumed range."""
 SLAB_M = 0.3
+"""Thickness of a garage's roof."""
 BEAM_M = 0.22
+"""How far beams hang below it; nothing that is put down may be higher."""
 
 
-def garage(site: Site, rng: np.random.Generator, irradiance: Range) -> None:
-    """An aisle between bays with parked cars and pillars, an end wall, perhaps with daylight.
-
-    Parameters
-    ----------
-    site : Site
-    rng : Generator
-    irradiance : (low, high)
-        Range of the irradiance below one lamp, W m-2.
-    """
+def lay_out_garage(site: Site, rng: np.random.Generator) -> None:
+    """An aisle between bays with parked cars and pillars, an end wall, perhaps with daylight."""
     height, aisle, depth = rng.uniform(2.25, 2.9), rng.uniform(5.5, 7.0), rng.uniform(4.8, 5.2)
     near = rng.random() < 0.4
+    # The power favours short distances: a third of all clips is to be near field, below 6 m.
     end = site.travel_m + (0.7 + 5.0 * rng.uniform() ** 1.5 if near else rng.uniform(8.0, 28.0))
     half = aisle / 2 + depth
-    shell(site, rng, end, half, height)
-    bay_lines(site, rng, end, aisle, depth)
+    build_garage_shell(site, rng, end, half, height)
+    paint_garage_floor(site, rng, end, aisle, depth)
     bay = rng.uniform(2.5, 2.8)
     for side in (-1, 1):
-        pillars(site, rng, end, side * (aisle / 2 + 0.5), 2 * bay, height)
+        put_pillars(site, rng, end, side * (aisle / 2 + 0.5), 2 * bay, height)
+    # Only now: walls and pillars reach up to the ceiling that things must stay under.
     site.enclose((-10.0, end - 0.05), (-half + 0.05, half - 0.05), height - BEAM_M)
     for side in (-1, 1):
-        parked(site, rng, end, side * (aisle / 2 + depth / 2 + 0.2), bay, side)
+        put_parked_cars(site, rng, end, side * (aisle / 2 + depth / 2 + 0.2), bay, side)
     if near and rng.random() < 0.5:
         site.put(vehicles.car(rng), end - 1.2, rng.uniform(-0.5, 0.5), np.pi / 2)
-    ceiling_lamps(site, rng, (-7.0, end), height, irradiance, (-aisle / 4, aisle / 4))
-    crossing(site, rng, (-aisle / 2, aisle / 2), near=0.8)
-    walkers(site, rng, (1, 3), (-aisle / 2 + 0.3, aisle / 2 - 0.3))
+    build_ceiling_lamps(site, rng, (-7.0, end), height, (-aisle / 4, aisle / 4))
+    put_crossers(site, rng, (-aisle / 2, aisle / 2), near=0.8)
+    put_walkers(site, rng, (1, 3), (-aisle / 2 + 0.3, aisle / 2 - 0.3))
     if rng.random() < 0.35:
         x = rng.uniform(8.0, 20.0) + site.travel_m
         path = Motion(Pose((x, aisle / 4, 0.0), np.pi), rng.uniform(0.5, 3.0))
-        approaching(site, rng, path, vehicles.car)
-    lead(site, rng)
-    row(site, rng, pavement_low, rng.choice([-1, 1]) * (aisle / 2 - 0.2), 4.0, 0.0, share=0.4)
+        put_approaching(site, rng, path, vehicles.car)
+    put_vehicle_ahead(site, rng)
+    put_row(site, rng, low_thing, rng.choice([-1, 1]) * (aisle / 2 - 0.2), 4.0, 0.0, share=0.4)
 
 
-def pavement_low(rng: np.random.Generator) -> meshes.Mesh:
+def low_thing(rng: np.random.Generator) -> Mesh:
     """Something that fits under a garage's ceiling."""
-    things = (furniture.crate, furniture.rubbish_bin, furniture.cone, furniture.bollard,
-              cycles.bicycle, furniture.cabinet)  # fmt: skip
-    return things[rng.integers(len(things))](rng)
+    return draw_one(
+        rng,
+        (furniture.crate, furniture.rubbish_bin, furniture.cone, furniture.bollard, cycles.bicycle,
+         furniture.cabinet),
+    )  # fmt: skip
 
 
-def shell(site: Site, rng: np.random.Generator, end: float, half: float, height: float) -> None:
+def build_garage_shell(
+    site: Site, rng: np.random.Generator, end: float, half: float, height: float
+) -> None:
     """Floor, ceiling with beams and a pipe, side walls, an end wall that may have an opening."""
     start, wall = -10.0, buildings.wall_material(rng)
     concrete = m.CONCRETE.draw(rng)
@@ -79,15 +98,17 @@ def shell(site: Site, rng: np.random.Generator, end: float, half: float, height:
             )
         )
     site.build(meshes.box((0.3, 2 * half, height), wall, (start - 0.15, 0.0, 0.0)))
-    end_wall(site, rng, end, half, height, wall)
+    build_end_wall(site, rng, end, half, height, wall)
 
 
-def end_wall(
+def build_end_wall(
     site: Site, rng: np.random.Generator, end: float, half: float, height: float, wall: m.Material
 ) -> None:
     """Closed, or a ramp up into daylight, or a parapet with daylight above it."""
     box = (-BEHIND_M, -half - 1.0, -1.0), (end, half + 1.0, height + SLAB_M)
     kind, lintel = rng.random(), rng.uniform(0.2, 0.5)
+    # Walls that the ego could meet are put, so that things keep off them; what is overhead or
+    # beyond the opening is built.
     if kind < 0.45:
         site.indoor = Indoor(*box, None)
         site.put(meshes.box((0.3, 2 * half, height), wall), end + 0.15, 0.0)
@@ -101,7 +122,7 @@ def end_wall(
         beside, middle = half - width / 2, (half + width / 2) / 2
         for side in (-1, 1):
             site.put(meshes.box((0.3, beside, height), wall), end + 0.15, side * middle)
-        ramp(site, rng, end, width, height + SLAB_M, wall)
+        build_ramp(site, rng, end, width, height + SLAB_M, wall)
         return
     parapet = rng.uniform(0.7, 1.1)
     site.indoor = Indoor(*box, ((-half, parapet), (half, height - lintel)))
@@ -113,7 +134,7 @@ def end_wall(
         site.put(plants.tree(rng), end + rng.uniform(3.0, 12.0), y)
 
 
-def ramp(
+def build_ramp(
     site: Site, rng: np.random.Generator, foot: float, width: float, rise: float, wall: m.Material
 ) -> None:
     """A way up to the street between two walls, with ribs across it; at its top stand trees."""
@@ -134,7 +155,9 @@ def ramp(
         site.build(meshes.at(plants.tree(rng), head + rng.uniform(2.0, 6.0), y, rise))
 
 
-def bay_lines(site: Site, rng: np.random.Generator, end: float, aisle: float, depth: float) -> None:
+def paint_garage_floor(
+    site: Site, rng: np.random.Generator, end: float, aisle: float, depth: float
+) -> None:
     """Painted lines between the bays and a dashed line along the aisle."""
     paint, pitch = m.ROAD_PAINT.draw(rng), 2.6
     for x in np.arange(-4.0, end - 0.3, pitch):
@@ -145,16 +168,17 @@ def bay_lines(site: Site, rng: np.random.Generator, end: float, aisle: float, de
         site.build(meshes.patch((x, x + 2.0), (-0.05, 0.05), PAINT_M, paint))
 
 
-def pillars(
+def put_pillars(
     site: Site, rng: np.random.Generator, end: float, y: float, every_m: float, height: float
 ) -> None:
     """A line of equal pillars."""
+    # One draw for all: pillars of a garage are alike.
     mesh = buildings.pillar(rng, height)
     for x in np.arange(rng.uniform(0.5, 3.0), end - 0.5, every_m):
         site.put(mesh, x, y)
 
 
-def parked(
+def put_parked_cars(
     site: Site, rng: np.random.Generator, end: float, y: float, bay: float, side: int
 ) -> None:
     """Cars across the aisle in some of the bays, either way round."""
@@ -165,16 +189,15 @@ def parked(
             site.put(vehicles.parked_car(rng), x, y, yaw + rng.uniform(-0.03, 0.03))
 
 
-def ceiling_lamps(
+def build_ceiling_lamps(
     site: Site,
     rng: np.random.Generator,
     x: tuple[float, float],
     height: float,
-    irradiance: Range,
     rows: tuple[float, ...],
 ) -> None:
     """Tubes under a ceiling along x, all of one kind, a few of them dead."""
-    intensity = lights.intensity_for(rng, irradiance, height)
+    intensity = lights.intensity_for(rng, TUBE_IRRADIANCE, height)
     radiance = lights.face_radiance(intensity, TUBE_LAMP_M * TUBE_WIDTH_M)
     casing, pitch = m.WHITE_PAINT.draw(rng), rng.uniform(3.5, 6.0)
     low = height - 0.14
@@ -189,28 +212,30 @@ def ceiling_lamps(
                 )
 
 
-def tunnel(site: Site, rng: np.random.Generator, irradiance: Range) -> None:
+def lay_out_tunnel(site: Site, rng: np.random.Generator) -> None:
     """A two-lane tube with lamps and kerbs; its exit opens on a road in daylight."""
     lane = rng.uniform(3.0, 3.6)
     centre, half = lane / 2, lane + rng.uniform(0.9, 1.6)
     exit_x = site.travel_m * rng.uniform(0.3, 1.0) + rng.uniform(4.0, 26.0)
     section = tube_section(rng, half)
-    tube(site, rng, section, centre, exit_x)
-    kerbs_and_paint(site, rng, centre, half, lane, exit_x)
+    build_tube(site, rng, section, centre, exit_x)
+    build_tunnel_road(site, rng, centre, half, lane, exit_x)
     height = max(z for _, z in section)
+    # From floor to crown, although the vault is narrower above: renderers aim at a rectangle, and
+    # what meets the lining instead is in shadow.
     site.indoor = Indoor(
         (-BEHIND_M, centre - half, -1.0),
         (exit_x, centre + half, height),
         ((centre - half, 0.0), (centre + half, height)),
     )
-    ceiling_lamps(site, rng, (-12.0, exit_x), height - 0.05, irradiance, (centre,))
-    wall_things(site, rng, centre - half, exit_x)
-    outside(site, rng, centre, half, exit_x)
-    lead(site, rng)
+    build_ceiling_lamps(site, rng, (-12.0, exit_x), height - 0.05, (centre,))
+    put_wall_things(site, rng, centre - half, exit_x)
+    lay_out_beyond_exit(site, rng, centre, half, exit_x)
+    put_vehicle_ahead(site, rng)
     if rng.random() < 0.6:
         x = rng.uniform(6.0, 26.0) + 0.5 * site.travel_m
-        approaching(site, rng, Motion(Pose((x, lane, 0.0), np.pi), rng.uniform(3.0, 14.0)))
-    walkers(site, rng, (0, 2), (centre - half + 0.3, centre - half + 0.5), 0.15)
+        put_approaching(site, rng, Motion(Pose((x, lane, 0.0), np.pi), rng.uniform(3.0, 14.0)))
+    put_walkers(site, rng, (0, 2), (centre - half + 0.3, centre - half + 0.5), 0.15)
 
 
 def tube_section(rng: np.random.Generator, half: float) -> list[tuple[float, float]]:
@@ -221,7 +246,7 @@ def tube_section(rng: np.random.Generator, half: float) -> list[tuple[float, flo
     return [(-half, 0.0), (-half, height), (half, height), (half, 0.0)]
 
 
-def tube(
+def build_tube(
     site: Site,
     rng: np.random.Generator,
     section: list[tuple[float, float]],
@@ -231,6 +256,7 @@ def tube(
     """Lining in rings with darker joints, and brighter tiles low on the walls."""
     lining, joint = m.CONCRETE.draw(rng), m.DARK_METAL.draw(rng)
     site.build(meshes.at(buildings.tunnel_tube(section, (-BEHIND_M, exit_x), lining), 0.0, centre))
+    # Joints stand a little inside the lining: two faces in one plane would flicker.
     narrow = [(0.99 * y, 0.995 * z) for y, z in section]
     for x in np.arange(exit_x - 0.3, -2.0, -rng.uniform(4.0, 8.0)):
         site.build(meshes.at(buildings.tunnel_tube(narrow, (x, x + 0.12), joint), 0.0, centre))
@@ -242,7 +268,7 @@ def tube(
             site.build(meshes.polygon(ring[::-side], tiles))
 
 
-def kerbs_and_paint(
+def build_tunnel_road(
     site: Site, rng: np.random.Generator, centre: float, half: float, lane: float, exit_x: float
 ) -> None:
     """Road surface, raised edges, the middle line and the edge lines."""
@@ -262,7 +288,7 @@ def kerbs_and_paint(
         site.build(meshes.patch((x, x + 2.5), (centre - 0.06, centre + 0.06), PAINT_M, paint))
 
 
-def wall_things(site: Site, rng: np.random.Generator, y: float, exit_x: float) -> None:
+def put_wall_things(site: Site, rng: np.random.Generator, y: float, exit_x: float) -> None:
     """Cabinets, doors and retro-reflecting marks on the right wall."""
     for x in np.arange(rng.uniform(2.0, 5.0), exit_x - 1.0, rng.uniform(4.0, 9.0)):
         cabinet = meshes.box((rng.uniform(0.5, 1.0), 0.2, 1.1), m.METAL.draw(rng), (0.0, 0.0, 0.15))
@@ -271,7 +297,7 @@ def wall_things(site: Site, rng: np.random.Generator, y: float, exit_x: float) -
         site.build(marker)
 
 
-def outside(
+def lay_out_beyond_exit(
     site: Site, rng: np.random.Generator, centre: float, half: float, exit_x: float
 ) -> None:
     """Verges, trees, signs and rails beyond the exit."""

@@ -4,38 +4,38 @@ from __future__ import annotations
 
 import numpy as np
 
-from shotenv.world.families.roads import BEHIND_M, REACH_M, puddles
-from shotenv.world.families.traffic import TRIES, one_of, row, walkers
+from shotenv.world.families.roads import BEHIND_M, REACH_M, build_puddles
+from shotenv.world.families.traffic import TRIES, draw_one, put_row, put_walkers
 from shotenv.world.geometry import Mesh, Motion, Pose, Site, materials as m, meshes
 from shotenv.world.things import cycles, plants
 
 
-def forest_path(site: Site, rng: np.random.Generator) -> None:
+def lay_out_forest_path(site: Site, rng: np.random.Generator) -> None:
     """A winding strip of trodden soil under trees, perhaps blocked by a fallen trunk."""
     half, far = rng.uniform(0.9, 1.6), site.travel_m + REACH_M
     litter = (m.LEAF_LITTER if rng.random() < 0.6 else m.GRASS).draw(rng)
     site.build(meshes.patch((-BEHIND_M, far), (-REACH_M, REACH_M), 0.0, litter))
-    trodden_strip(site, rng, half)
-    puddles(site, rng, (-1.5, 1.5))
+    build_trodden_strip(site, rng, half)
+    build_puddles(site, rng, (-1.5, 1.5))
     if rng.random() < 0.45:
         x = site.travel_m + 1.5 + 7.0 * rng.uniform() ** 1.5
         site.put(fallen_tree(rng), x, rng.uniform(-1.0, 1.0), rng.uniform(1.2, 1.9))
-    walkers(site, rng, (0, 3), (-half + 0.2, half - 0.2), 0.004)
+    put_walkers(site, rng, (0, 3), (-half + 0.2, half - 0.2), 0.004)
     if rng.random() < 0.3:
         x, speed = site.travel_m + rng.uniform(5.0, 14.0), rng.uniform(2.0, 6.0)
         path = Motion(Pose((x, 0.4 * half, 0.004), np.pi), speed)
-        site.move(cycles.cyclist(rng), path)
-    game(site, rng, half)
+        site.put_moving(cycles.cyclist(rng), path)
+    put_deer(site, rng, half)
     for side in (-1, 1):
         edge = side * (half + 0.5)
-        row(site, rng, undergrowth, edge + 0.2 * side, 1.7, 0.0, share=0.7, spread=0.4)
-        row(site, rng, beside_path, edge + 1.4 * side, 2.4, 0.0, share=0.7, spread=0.7)
-        row(site, rng, trunk, edge + 3.6 * side, 2.2, 0.0, share=0.8, spread=1.2)
-        row(site, rng, trunk, edge + 6.4 * side, 3.2, 0.0, share=0.8, spread=1.3)
-        row(site, rng, plants.conifer, edge + 10.0 * side, 5.0, 0.0, share=0.6, spread=1.5)
+        put_row(site, rng, undergrowth, edge + 0.2 * side, 1.7, 0.0, share=0.7, spread=0.4)
+        put_row(site, rng, thing_beside_path, edge + 1.4 * side, 2.4, 0.0, share=0.7, spread=0.7)
+        put_row(site, rng, trunk, edge + 3.6 * side, 2.2, 0.0, share=0.8, spread=1.2)
+        put_row(site, rng, trunk, edge + 6.4 * side, 3.2, 0.0, share=0.8, spread=1.3)
+        put_row(site, rng, plants.conifer, edge + 10.0 * side, 5.0, 0.0, share=0.6, spread=1.5)
 
 
-def trodden_strip(site: Site, rng: np.random.Generator, half: float) -> None:
+def build_trodden_strip(site: Site, rng: np.random.Generator, half: float) -> None:
     """The path itself: bare soil that swings a little from side to side."""
     soil, x = m.SOIL.draw(rng), np.arange(-BEHIND_M, site.travel_m + REACH_M, 4.0)
     swing = 0.25 * half * np.sin(x / rng.uniform(4.0, 8.0) + rng.uniform(0, 2 * np.pi))
@@ -45,7 +45,7 @@ def trodden_strip(site: Site, rng: np.random.Generator, half: float) -> None:
         site.build(meshes.polygon([(*corner, 0.004) for corner in ring], soil))
 
 
-def game(site: Site, rng: np.random.Generator, half: float) -> None:
+def put_deer(site: Site, rng: np.random.Generator, half: float) -> None:
     """Perhaps a few deer that stand or run across."""
     for _ in range(rng.integers(0, 3)):
         speed = rng.uniform(1.0, 7.0) if rng.random() < 0.5 else 0.0
@@ -53,18 +53,18 @@ def game(site: Site, rng: np.random.Generator, half: float) -> None:
         for _ in range(TRIES):
             x, away = site.travel_m + rng.uniform(3.0, 16.0), side * rng.uniform(half + 0.8, 7.0)
             yaw = -side * np.pi / 2 + rng.uniform(-0.4, 0.4)
-            if site.move(animal, Motion(Pose((x, away, 0.0), yaw), speed)):
+            if site.put_moving(animal, Motion(Pose((x, away, 0.0), yaw), speed)):
                 break
 
 
 def undergrowth(rng: np.random.Generator) -> Mesh:
     """Low plants and stones at the edge of the path."""
-    return one_of(rng, (fern, fern, fern, plants.grass_tuft, boulder, stump))
+    return draw_one(rng, (fern, fern, fern, plants.grass_tuft, boulder, stump))
 
 
-def beside_path(rng: np.random.Generator) -> Mesh:
+def thing_beside_path(rng: np.random.Generator) -> Mesh:
     """Something larger between path and trees."""
-    return one_of(rng, (trunk, trunk, boulder, log_pile, fern, root_plate, log))
+    return draw_one(rng, (trunk, trunk, boulder, log_pile, fern, root_plate, log))
 
 
 @meshes.thing
@@ -78,6 +78,7 @@ def trunk(rng: np.random.Generator) -> Mesh:
         meshes.rod((0, 0, z), (0.7 * np.cos(a), 0.7 * np.sin(a), z + 0.15), 0.02, bark, sections=3)
         for a, z in zip(turn, rng.uniform(1.2, 4.0, 3), strict=True)
     ]
+    # 20 faces are enough so high up; a wood has many trunks.
     crown = meshes.scaled(meshes.blob(rng, 1.0, leaves, (0.0, 0.0, 0.0), 0), (1.9, 1.9, 1.3))
     return meshes.join([meshes.lathe(profile, bark, sections=7), *stubs,
                         meshes.at(crown, 0.0, 0.0, high)])  # fmt: skip

@@ -5,40 +5,45 @@ from __future__ import annotations
 import numpy as np
 
 from shotenv.world.families.traffic import (
-    crossing,
-    cyclists,
-    lead,
-    oncoming,
     pavement_thing,
+    put_crossers,
+    put_cyclist,
+    put_oncoming,
+    put_row,
+    put_street_lamps,
+    put_vehicle_ahead,
+    put_walkers,
     roadside_thing,
-    row,
-    street_lamps,
-    walkers,
 )
 from shotenv.world.geometry import Mesh, Site, materials as m, meshes
 from shotenv.world.things import buildings, furniture, plants, shelters, vehicles
 from unwrap.support import Range
 
 BEHIND_M = 60.0
-SHOP_RADIANCE = (2e-3, 5e-2)
 REACH_M = 120.0
+"""How far ground and roads reach behind the ego, and beyond the end of its way and to the sides."""
+SHOP_RADIANCE = (2e-3, 5e-2)
+"""Radiance of the ceiling of a shop that is lit by night, W m-2 sr-1; an assumed range."""
 KERB_M = 0.12
+"""Height of a pavement over the road."""
 PAINT_M = 0.008
 PUDDLE_M = 0.013
+"""Heights of paint and of water over the ground: each layer above those that it may cover."""
 
 
-def country_road(site: Site, rng: np.random.Generator) -> None:
+def lay_out_country_road(site: Site, rng: np.random.Generator) -> None:
     """Two lanes, verges, trees, signs, guard rails, traffic."""
     lane, far = rng.uniform(3.0, 3.75), site.travel_m + REACH_M
     right, left = -lane / 2 - 0.4, 1.5 * lane + 0.4
-    carriageway(site, rng, right, left, lane)
+    build_carriageway(site, rng, right, left, lane)
     verge = (m.GRASS if rng.random() < 0.7 else m.SOIL).draw(rng)
     for y in ((-REACH_M, right), (left, REACH_M)):
         site.build(meshes.patch((-BEHIND_M, far), y, 0.0, verge))
-    oncoming(site, rng, lane)
-    lead(site, rng)
-    walkers(site, rng, (0, 3), (right - 1.5, right - 0.6))
-    cyclists(site, rng, right + 0.35)
+    # What moves comes first: its way must be free for the whole clip, and parked things fill up.
+    put_oncoming(site, rng, lane)
+    put_vehicle_ahead(site, rng)
+    put_walkers(site, rng, (0, 3), (right - 1.5, right - 0.6))
+    put_cyclist(site, rng, right + 0.35)
     if rng.random() < 0.4:
         rail = furniture.guard_rail if rng.random() < 0.6 else furniture.jersey_barrier
         length, x = rng.uniform(12.0, 30.0), site.travel_m / 2 + rng.uniform(6, 20)
@@ -47,32 +52,32 @@ def country_road(site: Site, rng: np.random.Generator) -> None:
         length = rng.uniform(6, 16)
         x = site.travel_m + rng.uniform(5, 15)
         site.put(hedge_or_wall(rng, length), x, left + 1.5, -np.pi / 2)
-    street_lamps(site, rng, right - 1.2, rng.uniform(18, 30))
-    row(site, rng, roadside_thing, right - 1.3, 3.5, np.pi, share=0.75, spread=2.0)
-    row(site, rng, roadside_thing, left + 1.3, 4.5, 0.0, share=0.7, spread=3.0)
-    row(site, rng, plants.tree, right - 6.0, 9.0, 0.0, share=0.5, spread=3.0)
+    put_street_lamps(site, rng, right - 1.2, rng.uniform(18, 30))
+    put_row(site, rng, roadside_thing, right - 1.3, 3.5, np.pi, share=0.75, spread=2.0)
+    put_row(site, rng, roadside_thing, left + 1.3, 4.5, 0.0, share=0.7, spread=3.0)
+    put_row(site, rng, plants.tree, right - 6.0, 9.0, 0.0, share=0.5, spread=3.0)
 
 
-def town_street(site: Site, rng: np.random.Generator) -> None:
+def lay_out_town_street(site: Site, rng: np.random.Generator) -> None:
     """A street between facades with pavements, parked cars and people who cross."""
     lane, far = rng.uniform(2.8, 3.4), site.travel_m + REACH_M
     parking = rng.uniform(2.0, 2.3)
     parking_left = parking if rng.random() < 0.5 else 0.3
     right, left = -lane / 2 - parking, 1.5 * lane + parking_left
     pavement = rng.uniform(1.8, 3.2)
-    carriageway(site, rng, right, left, lane, edge_lines=False)
+    build_carriageway(site, rng, right, left, lane, edge_lines=False)
     paving = m.PAVING.draw(rng)
     for side, kerb in ((-1, right), (1, left)):
         site.build(side_walk(rng, side, kerb, (-BEHIND_M, far), paving))
-    facades(site, rng, right - pavement, np.pi / 2)
-    facades(site, rng, left + pavement, -np.pi / 2)
-    lead(site, rng)
-    oncoming(site, rng, lane)
-    crossing(site, rng, (right + 0.3, left - 0.3))
-    walkers(site, rng, (1, 4), (right - pavement + 0.5, right - 0.5), KERB_M)
-    walkers(site, rng, (0, 3), (left + 0.5, left + pavement - 0.5), KERB_M)
-    cyclists(site, rng, -lane / 2 - 0.1)
-    row(
+    put_facades(site, rng, right - pavement, np.pi / 2)
+    put_facades(site, rng, left + pavement, -np.pi / 2)
+    put_vehicle_ahead(site, rng)
+    put_oncoming(site, rng, lane)
+    put_crossers(site, rng, (right + 0.3, left - 0.3))
+    put_walkers(site, rng, (1, 4), (right - pavement + 0.5, right - 0.5), KERB_M)
+    put_walkers(site, rng, (0, 3), (left + 0.5, left + pavement - 0.5), KERB_M)
+    put_cyclist(site, rng, -lane / 2 - 0.1)
+    put_row(
         site,
         rng,
         vehicles.parked_car,
@@ -82,7 +87,7 @@ def town_street(site: Site, rng: np.random.Generator) -> None:
         share=rng.uniform(0.3, 0.9),
     )
     if parking_left == parking:
-        row(
+        put_row(
             site,
             rng,
             vehicles.parked_car,
@@ -91,19 +96,20 @@ def town_street(site: Site, rng: np.random.Generator) -> None:
             np.pi,
             share=rng.uniform(0.2, 0.8),
         )
-    street_lamps(site, rng, right - 0.5, rng.uniform(13, 20), KERB_M)
-    row(site, rng, pavement_thing, right - 0.5, 2.6, np.pi, KERB_M, share=0.6)
-    row(site, rng, pavement_thing, left + 0.5, 3.5, 0.0, KERB_M, share=0.5)
+    put_street_lamps(site, rng, right - 0.5, rng.uniform(13, 20), KERB_M)
+    put_row(site, rng, pavement_thing, right - 0.5, 2.6, np.pi, KERB_M, share=0.6)
+    put_row(site, rng, pavement_thing, left + 0.5, 3.5, 0.0, KERB_M, share=0.5)
 
 
-def car_park(site: Site, rng: np.random.Generator) -> None:
+def lay_out_car_park(site: Site, rng: np.random.Generator) -> None:
     """The ego noses up to a wall, a hedge or a car; more cars and people beside."""
     far = site.travel_m + REACH_M
     ground = (m.ASPHALT if rng.random() < 0.6 else m.PAVING).draw(rng)
     site.build(meshes.patch((-BEHIND_M, far), (-REACH_M, REACH_M), 0.0, ground))
+    # The power favours short distances: car parks are much of the near field.
     end = site.travel_m + 0.7 + 5.0 * rng.uniform() ** 1.5
-    bays(site, rng, end, rng.uniform(2.5, 2.9))
-    puddles(site, rng, (-5.0, 5.0))
+    paint_bays(site, rng, end, rng.uniform(2.5, 2.9))
+    build_puddles(site, rng, (-5.0, 5.0))
     ahead = rng.random()
     if ahead < 0.35:
         car, facing = vehicles.car(rng), np.pi if rng.random() < 0.5 else 0.0
@@ -118,13 +124,13 @@ def car_park(site: Site, rng: np.random.Generator) -> None:
                 site.put(
                     vehicles.parked_car(rng), x, y + rng.uniform(-0.2, 0.2), rng.integers(2) * np.pi
                 )
-    crossing(site, rng, (-4.0, 4.0), near=0.9)
-    walkers(site, rng, (1, 4), (-6.0, 6.0))
-    row(site, rng, pavement_thing, 0.0, 2.5, 0.0, share=0.5, spread=5.0)
-    street_lamps(site, rng, -rng.uniform(3, 6), 14.0)
+    put_crossers(site, rng, (-4.0, 4.0), near=0.9)
+    put_walkers(site, rng, (1, 4), (-6.0, 6.0))
+    put_row(site, rng, pavement_thing, 0.0, 2.5, 0.0, share=0.5, spread=5.0)
+    put_street_lamps(site, rng, -rng.uniform(3, 6), 14.0)
 
 
-def carriageway(
+def build_carriageway(
     site: Site,
     rng: np.random.Generator,
     right: float,
@@ -147,13 +153,14 @@ def carriageway(
         for y in np.arange(right + 0.3, left - 0.6, 1.0):
             site.build(meshes.patch((start, start + 3.5), (y, y + 0.5), PAINT_M + 0.002, paint))
     if rng.random() < 0.5:
-        patches(site, rng, right, left)
-    puddles(site, rng, (right, left))
+        build_repairs(site, rng, right, left)
+    build_puddles(site, rng, (right, left))
 
 
-def patches(site: Site, rng: np.random.Generator, right: float, left: float) -> None:
+def build_repairs(site: Site, rng: np.random.Generator, right: float, left: float) -> None:
     """Repaired asphalt and manhole covers."""
     for layer in range(rng.integers(1, 5)):
+        # Each on a level of its own, so that no two lie in one plane; all of them under paint.
         height = 0.002 + 0.001 * layer
         x, y = rng.uniform(2, 20 + site.travel_m), rng.uniform(right + 0.8, left - 0.8)
         if rng.random() < 0.5:
@@ -166,7 +173,7 @@ def patches(site: Site, rng: np.random.Generator, right: float, left: float) -> 
             site.build(meshes.polygon(disc, m.DARK_METAL.draw(rng)))
 
 
-def puddles(site: Site, rng: np.random.Generator, y: Range) -> None:
+def build_puddles(site: Site, rng: np.random.Generator, y: Range) -> None:
     """Water that stands on wet ground between `y`: the more, the wetter."""
     for _ in range(rng.integers(4, 12) if site.weather.wetness else 0):
         length, half = rng.uniform(0.4, 2.5), rng.uniform(0.2, 0.8) * site.weather.wetness
@@ -193,7 +200,7 @@ def side_walk(
     )
 
 
-def facades(site: Site, rng: np.random.Generator, y: float, yaw: float) -> None:
+def put_facades(site: Site, rng: np.random.Generator, y: float, yaw: float) -> None:
     """Buildings, walls, hedges and gaps along a line."""
     x = rng.uniform(-12.0, -4.0)
     while x < site.travel_m + 32.0:
@@ -232,7 +239,7 @@ def hedge_or_wall(rng: np.random.Generator, length_m: float) -> Mesh:
     return buildings.wall(rng, length_m, rng.uniform(0.8, 2.6))
 
 
-def bays(site: Site, rng: np.random.Generator, end: float, width: float) -> None:
+def paint_bays(site: Site, rng: np.random.Generator, end: float, width: float) -> None:
     """Lines between parking bays, to both sides of the ego's."""
     paint = m.ROAD_PAINT.draw(rng)
     for i in range(-4, 4):

@@ -9,65 +9,72 @@ import numpy as np
 from shotenv.world.families.roads import BEHIND_M, REACH_M
 from shotenv.world.families.traffic import (
     TRIES,
-    approaching,
-    crossing,
-    lead,
-    one_of,
-    row,
-    street_lamps,
-    walkers,
+    draw_one,
+    put_approaching,
+    put_crossers,
+    put_row,
+    put_street_lamps,
+    put_vehicle_ahead,
+    put_walkers,
 )
 from shotenv.world.geometry import Material, Mesh, Motion, Pose, Site, materials as m, meshes
 from shotenv.world.things import cab, nose_lamps, people, plants, vehicles, wheel
 
 
-def snowy_street(site: Site, rng: np.random.Generator) -> None:
+def lay_out_snowy_street(site: Site, rng: np.random.Generator) -> None:
     """A cleared lane between banks of snow, chalets, snowed-in cars and trees."""
     half, far = rng.uniform(2.4, 3.4), site.travel_m + REACH_M
     site.build(meshes.patch((-BEHIND_M, far), (-REACH_M, REACH_M), 0.0, m.SNOW.draw(rng)))
-    wheel_tracks(site, rng)
-    lead(site, rng)
+    build_wheel_tracks(site, rng)
+    put_vehicle_ahead(site, rng)
     if rng.random() < 0.5:
         x, lane = rng.uniform(8.0, 24.0) + 0.5 * site.travel_m, rng.uniform(0.5, 0.9) * half
         draw = snow_plough if rng.random() < 0.6 else vehicles.traffic
-        approaching(site, rng, Motion(Pose((x, lane, 0.0), np.pi), rng.uniform(2.0, 8.0)), draw)
-    crossing(site, rng, (-half, half))
+        put_approaching(site, rng, Motion(Pose((x, lane, 0.0), np.pi), rng.uniform(2.0, 8.0)), draw)
+    put_crossers(site, rng, (-half, half))
     for _ in range(rng.integers(0, 3)):
-        tow(site, rng, half)
-    walkers(site, rng, (0, 3), (-half + 0.3, half - 0.3))
+        put_sledge(site, rng, half)
+    put_walkers(site, rng, (0, 3), (-half + 0.3, half - 0.3))
     if rng.random() < 0.4:
         x = site.travel_m + 1.0 + 6.0 * rng.uniform() ** 1.5
-        blocking = one_of(rng, (snow_bank, snowman))
+        blocking = draw_one(rng, (snow_bank, snowman))
         site.put(blocking, x - float(blocking.corners[..., 0].min()), rng.uniform(-0.8, 0.8), np.pi)
-    street_lamps(site, rng, -half - 0.6, rng.uniform(14, 24))
+    put_street_lamps(site, rng, -half - 0.6, rng.uniform(14, 24))
     for side in (-1, 1):
-        row(site, rng, roadside, side * (half + 0.9), 2.6, -side * np.pi / 2, share=0.9)
-        row(site, rng, vehicles.parked_car, side * (half + 2.9), 6.0, np.pi, share=0.4)
-        row(site, rng, chalet, side * (half + 6.5), 9.5, -side * np.pi / 2, share=0.7, spread=0.8)
-        row(site, rng, plants.conifer, side * (half + 4.6), 4.0, 0.0, share=0.6, spread=1.0)
+        put_row(
+            site, rng, snowy_roadside_thing, side * (half + 0.9), 2.6, -side * np.pi / 2, share=0.9
+        )
+        put_row(site, rng, vehicles.parked_car, side * (half + 2.9), 6.0, np.pi, share=0.4)
+        put_row(
+            site, rng, chalet, side * (half + 6.5), 9.5, -side * np.pi / 2, share=0.7, spread=0.8
+        )
+        put_row(site, rng, plants.conifer, side * (half + 4.6), 4.0, 0.0, share=0.6, spread=1.0)
 
 
-def wheel_tracks(site: Site, rng: np.random.Generator) -> None:
+def build_wheel_tracks(site: Site, rng: np.random.Generator) -> None:
     """Two strips where wheels have worn the snow down to the asphalt, of both lanes or one."""
     asphalt, far = m.ASPHALT.draw(rng), site.travel_m + REACH_M
+    # Neither dry asphalt nor snow: dark where it is worn through, bright where slush is left.
     worn = Material(asphalt.albedo_low, rng.uniform(0.2, 0.8), 2.0, mirror=0.03)
     for y in (-0.75, 0.75, 2.0, 3.2)[: 2 * rng.integers(1, 3)]:
-        site.shelter(meshes.patch((-BEHIND_M, far), (y - 0.18, y + 0.18), 0.004, worn))
+        site.build(
+            meshes.patch((-BEHIND_M, far), (y - 0.18, y + 0.18), 0.004, worn), sheltered=True
+        )
 
 
-def tow(site: Site, rng: np.random.Generator, half: float) -> None:
+def put_sledge(site: Site, rng: np.random.Generator, half: float) -> None:
     """Somebody who pulls a sledge along the street."""
     mesh, speed = sledge(rng), rng.uniform(0.7, 1.4)
     for _ in range(TRIES):
         place = (site.travel_m + rng.uniform(1.5, 12.0), rng.uniform(-half, half), 0.0)
         yaw = rng.integers(2) * np.pi + rng.uniform(-0.2, 0.2)
-        if site.move(mesh, Motion(Pose(place, yaw), speed)):
+        if site.put_moving(mesh, Motion(Pose(place, yaw), speed)):
             return
 
 
-def roadside(rng: np.random.Generator) -> Mesh:
+def snowy_roadside_thing(rng: np.random.Generator) -> Mesh:
     """What stands at the edge of a cleared street."""
-    return one_of(rng, (snow_bank, snow_bank, snow_bank, snow_bank, snowman, marker_stake))
+    return draw_one(rng, (snow_bank, snow_bank, snow_bank, snow_bank, snowman, marker_stake))
 
 
 @meshes.thing
@@ -176,6 +183,6 @@ def sledge(rng: np.random.Generator) -> Mesh:
     line = meshes.rod((-1.1, 0.0, 0.1), (-0.1, 0.2, 0.86), 0.01, rope, sections=3)
     parts = [people.adult(rng, people.STRIDE_S), *runners, seat, line]
     if rng.random() < 0.6:
-        parts.append(meshes.scaled(people.torso(rng, (-1.7, 0.0, 0.18)), (1.0, 1.0, 1.0)))
+        parts.append(people.torso(rng, (-1.7, 0.0, 0.18)))
         parts.append(people.head(rng, (-1.66, 0.0, 1.02)))
     return meshes.join(parts)

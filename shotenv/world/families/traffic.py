@@ -11,10 +11,15 @@ from shotenv.world.things import cycles, furniture, people, plants, shelters, ve
 from unwrap.support import Range
 
 HEADLAMP_M2 = 0.05
+"""Area of the face of a head light."""
 HEADLAMP_W_SR = (0.05, 1.0)
+"""Intensity of a head light in band: LED ones hardly shine there, halogen ones do; assumed."""
 TAIL_RADIANCE = (0.02, 0.2)
+"""Radiance of a tail lamp's face in band, W m-2 sr-1; an assumed range."""
 STREET_IRRADIANCE = (1e-3, 2e-2)
+"""Irradiance in band below a street lamp, W m-2; an assumed range."""
 TRIES = 4
+"""Places that are tried for something that moves, before it is left out."""
 DrawPasser = Callable[[np.random.Generator, float], tuple[Mesh, float]]
 """Draws a mesh and its speed in m/s, given how wet it is."""
 
@@ -35,7 +40,7 @@ def crosser(rng: np.random.Generator, wetness: float) -> tuple[Mesh, float]:
     return people.somebody(rng, speed, wetness), speed
 
 
-def walkers(
+def put_walkers(
     site: Site,
     rng: np.random.Generator,
     count: tuple[int, int],
@@ -45,17 +50,18 @@ def walkers(
 ) -> None:
     """People who stand or move along the road, either way: at least count[0], below count[1]."""
     near = site.travel_m + 0.9
+    # As far as people are more than a few pixels, and within the room where there is one.
     far = max(near, min(near + 17.0, site.room[1, 0] - 0.5))
     for _ in range(rng.integers(*count)):
         somebody, speed = draw(rng, site.weather.wetness)
         for _ in range(TRIES):
             yaw = rng.integers(2) * np.pi + rng.uniform(-0.05, 0.05)
             place = (rng.uniform(near, far), rng.uniform(*y), z)
-            if site.move(somebody, Motion(Pose(place, yaw), speed)):
+            if site.put_moving(somebody, Motion(Pose(place, yaw), speed)):
                 break
 
 
-def crossing(
+def put_crossers(
     site: Site,
     rng: np.random.Generator,
     y: Range,
@@ -66,6 +72,7 @@ def crossing(
     span = min(7.0, site.room[1, 0] - site.travel_m - near - 0.5)
     for _ in range(rng.integers(0, 3)):
         somebody, wish = draw(rng, site.weather.wetness)
+        # In a long clip they walk slower, rather than through what stands beside the road.
         speed = min(wish, (y[1] - y[0]) / site.duration_s)
         room = y[1] - y[0] - speed * site.duration_s
         for _ in range(TRIES):
@@ -73,11 +80,11 @@ def crossing(
             across = start if side > 0 else y[0] + y[1] - start
             x = site.travel_m + near + max(span, 0.0) * rng.uniform() ** 1.5
             yaw = side * np.pi / 2 + rng.uniform(-0.2, 0.2)
-            if site.move(somebody, Motion(Pose((x, across, 0.0), yaw), speed)):
+            if site.put_moving(somebody, Motion(Pose((x, across, 0.0), yaw), speed)):
                 break
 
 
-def lead(site: Site, rng: np.random.Generator) -> None:
+def put_vehicle_ahead(site: Site, rng: np.random.Generator) -> None:
     """Perhaps a vehicle ahead in the ego's lane: close in a queue, further off when fast."""
     if rng.random() < 0.4:
         return
@@ -86,30 +93,32 @@ def lead(site: Site, rng: np.random.Generator) -> None:
     gap = 0.6 + rng.uniform(0.0, 3.5) + 0.8 * site.ego.speed_m_s * rng.uniform(0.3, 1.2)
     tail = m.log_uniform(rng, TAIL_RADIANCE) if site.night else 0.0
     vehicle = cycles.cyclist(rng) if rng.random() < 0.12 else vehicles.traffic(rng, 0.0, tail)
+    # The gap is to its rear, however long it is.
     rear = float(vehicle.corners[..., 0].min())
     start = Pose((gap + 0.4 - rear, rng.uniform(-0.3, 0.3), 0.0))
-    site.move(vehicle, Motion(start, speed))
+    site.put_moving(vehicle, Motion(start, speed))
 
 
-def oncoming(site: Site, rng: np.random.Generator, lane: float) -> None:
+def put_oncoming(site: Site, rng: np.random.Generator, lane: float) -> None:
     """Up to two vehicles in the other lane, coming closer or standing in a queue."""
     for _ in range(rng.integers(0, 3)):
         speed = rng.uniform(3.0, 14.0) if rng.random() < 0.75 else 0.0
         x, y = rng.uniform(5.0, 28.0) + 0.5 * site.travel_m, lane + rng.uniform(-0.2, 0.3)
-        approaching(site, rng, Motion(Pose((x, y, 0.0), np.pi), speed))
+        put_approaching(site, rng, Motion(Pose((x, y, 0.0), np.pi), speed))
 
 
-def approaching(
+def put_approaching(
     site: Site,
     rng: np.random.Generator,
     motion: Motion,
     draw: Callable[[np.random.Generator, float], Mesh] = vehicles.traffic,
 ) -> None:
     """A vehicle seen from the front, in the dark with its head lights on."""
+    # In garages and tunnels too, whatever the time of day.
     lit = site.night or site.indoor is not None
     intensity = m.log_uniform(rng, HEADLAMP_W_SR) if lit else 0.0
     mesh = draw(rng, lights.face_radiance(intensity, HEADLAMP_M2))
-    if site.move(mesh, motion) and intensity:
+    if site.put_moving(mesh, motion) and intensity:
         site.lamps += head_lights(mesh, intensity, carrier=len(site.moving) - 1)
 
 
@@ -123,14 +132,14 @@ def head_lights(mesh: Mesh, intensity_w_sr: float, carrier: int) -> list[Lamp]:
     ]
 
 
-def cyclists(site: Site, rng: np.random.Generator, y: float) -> None:
+def put_cyclist(site: Site, rng: np.random.Generator, y: float) -> None:
     """Perhaps somebody on a bicycle at the edge of the lane."""
     if rng.random() < 0.3:
         x, speed = site.travel_m * rng.uniform() + rng.uniform(4.0, 12.0), rng.uniform(2.5, 6.5)
-        site.move(cycles.cyclist(rng), Motion(Pose((x, y, 0.0)), speed))
+        site.put_moving(cycles.cyclist(rng), Motion(Pose((x, y, 0.0)), speed))
 
 
-def row(
+def put_row(
     site: Site,
     rng: np.random.Generator,
     draw: Callable[[np.random.Generator], Mesh],
@@ -148,7 +157,7 @@ def row(
             site.put(draw(rng), x + along, y + across, yaw, z)
 
 
-def street_lamps(
+def put_street_lamps(
     site: Site, rng: np.random.Generator, y: float, every_m: float, z: float = 0.0
 ) -> None:
     """Lamp posts on the right whose arms reach over the road; by night they shine."""
@@ -163,16 +172,16 @@ def street_lamps(
             site.lamps.append(Lamp(head, intensity, 0.3, cutoff_cos=float(np.cos(1.25))))
 
 
-def one_of(
+def draw_one(
     rng: np.random.Generator, things: tuple[Callable[[np.random.Generator], Mesh], ...]
 ) -> Mesh:
-    """Any of several assets."""
+    """One of several things; what is listed twice comes twice as often."""
     return things[rng.integers(len(things))](rng)
 
 
 def roadside_thing(rng: np.random.Generator) -> Mesh:
     """Something from the edge of a country road."""
-    return one_of(
+    return draw_one(
         rng,
         (plants.tree, plants.tree, plants.shrub, plants.shrub, plants.shrub, furniture.sign,
          furniture.pole, furniture.delineator, furniture.delineator, furniture.cone,
@@ -182,7 +191,7 @@ def roadside_thing(rng: np.random.Generator) -> Mesh:
 
 def pavement_thing(rng: np.random.Generator) -> Mesh:
     """Something from a town's pavement."""
-    return one_of(
+    return draw_one(
         rng,
         (furniture.bollard, furniture.sign, furniture.sign, furniture.crate, furniture.rubbish_bin,
          plants.tree, plants.bush, furniture.pole, furniture.cone, furniture.cabinet,

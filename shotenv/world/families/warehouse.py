@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from shotenv.world.families.construction import at_work
+from shotenv.world.families.construction import passing_worker
 from shotenv.world.families.roads import BEHIND_M, PAINT_M, REACH_M
-from shotenv.world.families.traffic import crossing, one_of, row, walkers
+from shotenv.world.families.traffic import draw_one, put_crossers, put_row, put_walkers
 from shotenv.world.geometry import (
     Indoor,
     Lamp,
@@ -24,32 +24,38 @@ from unwrap.support import Range
 
 RACK_DEPTH_M = 1.1
 BAY_M = 2.7
+"""Width of a rack's bay: room for two pallets side by side."""
 LAMP_M = (0.6, 0.4)
+HIGH_BAY_IRRADIANCE: Range = (1e-2, 0.3)
+"""Irradiance in band straight below one lamp, W m-2; an assumed range."""
 
 
-def hall(site: Site, rng: np.random.Generator, irradiance: Range) -> None:
-    """An aisle between racks that ends at docks; `irradiance` below one lamp, W m-2."""
+def lay_out_warehouse(site: Site, rng: np.random.Generator) -> None:
+    """An aisle between racks that ends at docks."""
     aisle, height = rng.uniform(3.2, 4.4), rng.uniform(5.5, 8.5)
     near = rng.random() < 0.4
     end = site.travel_m + (1.0 + 5.0 * rng.uniform() if near else rng.uniform(9.0, 28.0))
     half = aisle / 2 + 2 * RACK_DEPTH_M + 2.8
-    shell(site, rng, end, half, height)
-    lines(site, rng, end, aisle)
+    build_hall_shell(site, rng, end, half, height)
+    paint_aisle(site, rng, end, aisle)
     site.enclose((-10.0, end - 0.05), (-half + 0.05, half - 0.05), height - 0.5)
-    crossing(site, rng, (-aisle / 2, aisle / 2), near=0.8, draw=at_work)
-    fork_lifts(site, rng, end, aisle)
-    walkers(site, rng, (0, 2), (-aisle / 2 + 0.3, aisle / 2 - 0.3), draw=at_work)
+    put_crossers(site, rng, (-aisle / 2, aisle / 2), near=0.8, draw=passing_worker)
+    put_fork_lift(site, rng, end, aisle)
+    put_walkers(site, rng, (0, 2), (-aisle / 2 + 0.3, aisle / 2 - 0.3), draw=passing_worker)
     for side in (-1, 1):
         y = side * (aisle / 2 + RACK_DEPTH_M / 2 + 0.1)
-        row(site, rng, floor_thing, side * (aisle / 2 - 0.35), 3.0, 0.0, share=0.35)
+        put_row(site, rng, floor_thing, side * (aisle / 2 - 0.35), 3.0, 0.0, share=0.35)
+        # Racks further off would fill the budget of triangles for a few pixels.
         for x in np.arange(-1.0, min(end - 3.0, site.travel_m + 24.0), BAY_M + 0.02):
             site.put(pallet_rack(rng, min(3, int((height - 1.0) / 1.7))), x, y, -side * np.pi / 2)
     for y in np.arange(-half + 1.5, half - 1.0, 1.7):
-        site.put(one_of(rng, (pallet, pallet, drum, pallet_jack)), end - rng.uniform(1, 2.2), y)
-    high_bays(site, rng, end, height, irradiance)
+        site.put(floor_thing(rng), end - rng.uniform(1, 2.2), y)
+    build_high_bays(site, rng, end, height)
 
 
-def shell(site: Site, rng: np.random.Generator, end: float, half: float, height: float) -> None:
+def build_hall_shell(
+    site: Site, rng: np.random.Generator, end: float, half: float, height: float
+) -> None:
     """Floor, clad walls, a roof on trusses, and an end wall with docks, one of them open or not."""
     cladding, roof, steel = m.METAL.draw(rng), m.WHITE_PAINT.draw(rng), m.METAL.draw(rng)
     x = (-12.0, end)
@@ -65,10 +71,10 @@ def shell(site: Site, rng: np.random.Generator, end: float, half: float, height:
         wall = meshes.box((length, 0.3, height), cladding, (middle, side * (half + 0.15), 0.0))
         site.build(wall)
     site.build(meshes.box((0.3, 2 * half, height), cladding, (x[0] - 0.15, 0.0, 0.0)))
-    docks(site, rng, end, half, height, cladding)
+    build_docks(site, rng, end, half, height, cladding)
 
 
-def docks(
+def build_docks(
     site: Site, rng: np.random.Generator, end: float, half: float, height: float, wall: Material
 ) -> None:
     """The end wall with three gates, the middle one perhaps open on a yard in daylight."""
@@ -103,7 +109,7 @@ def dock_door(rng: np.random.Generator, width_m: float) -> Mesh:
     return meshes.join([*sections, *panes, *sides])
 
 
-def lines(site: Site, rng: np.random.Generator, end: float, aisle: float) -> None:
+def paint_aisle(site: Site, rng: np.random.Generator, end: float, aisle: float) -> None:
     """Painted edges of the aisle."""
     paint = m.ROAD_PAINT.draw(rng)
     for y in (-aisle / 2 + 0.1, aisle / 2 - 0.1):
@@ -112,25 +118,23 @@ def lines(site: Site, rng: np.random.Generator, end: float, aisle: float) -> Non
 
 def floor_thing(rng: np.random.Generator) -> Mesh:
     """Something left beside the aisle."""
-    return one_of(rng, (pallet, pallet, drum, pallet_jack))
+    return draw_one(rng, (pallet, pallet, drum, pallet_jack))
 
 
-def fork_lifts(site: Site, rng: np.random.Generator, end: float, aisle: float) -> None:
+def put_fork_lift(site: Site, rng: np.random.Generator, end: float, aisle: float) -> None:
     """Perhaps a fork lift in the aisle, coming, going or standing."""
     if rng.random() < 0.35:
         return
     speed = rng.uniform(0.8, 3.0) if rng.random() < 0.7 else 0.0
     x, yaw = site.travel_m + rng.uniform(4.0, 10.0), rng.integers(2) * np.pi
     offset = (aisle / 2 - 0.9) * rng.uniform(-0.6, 1.0)
-    site.move(fork_lift(rng), Motion(Pose((min(x, end - 3.0), offset, 0.0), yaw), speed))
+    site.put_moving(fork_lift(rng), Motion(Pose((min(x, end - 3.0), offset, 0.0), yaw), speed))
 
 
-def high_bays(
-    site: Site, rng: np.random.Generator, end: float, height: float, irradiance: Range
-) -> None:
+def build_high_bays(site: Site, rng: np.random.Generator, end: float, height: float) -> None:
     """Lamps under the roof along the aisle."""
     drop = height - 0.6
-    intensity = lights.intensity_for(rng, irradiance, drop)
+    intensity = lights.intensity_for(rng, HIGH_BAY_IRRADIANCE, drop)
     radiance, metal = lights.face_radiance(intensity, LAMP_M[0] * LAMP_M[1]), m.METAL.draw(rng)
     for x in np.arange(-5.0, end - 1.0, rng.uniform(4.0, 6.5)):
         site.build(high_bay(metal, radiance, float(x), drop))

@@ -1,4 +1,9 @@
-"""What worlds are made of: meshes, materials, lights, weather, the site."""
+"""What worlds are made of: meshes, materials, lights, weather, the site.
+
+`model.py` is what renderers read; `meshes.py` has the primitives that things are built of;
+`materials.py` the near-infrared albedos; `lights.py` sun, sky and head lights; `weather.py` wet and
+snow; `site.py` the ground that is still free.
+"""
 
 import lazy_loader
 

@@ -1,7 +1,8 @@
 """Passive light in band: sun, sky and lamps.
 
-Numbers are for 940 +- 15 nm. Direct sun is ASTM G173's 11.6 W m-2 (air mass 1.5), scaled with air
-mass by Meinel's clearness law; sky radiances and lamp intensities are assumed ranges.
+Numbers are for 940 +- 15 nm: irradiance W m-2, radiance W m-2 sr-1, radiant intensity W sr-1.
+Direct sun is ASTM G173's 11.6 W m-2 (air mass 1.5), scaled with air mass by Meinel's clearness
+law; sky radiances and lamp intensities are assumed ranges.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from shotenv.world.geometry.model import Lamp, Light
 from unwrap.support import Range
 
 G173_IRRADIANCE = 11.6
+"""Direct sun of ASTM G173 in band, W m-2, at the air mass below."""
 G173_AIR_MASS = 1.5
 LOW_SUN_RAD = np.radians(15.0)
 """Elevation below which the sun counts as low."""
@@ -82,7 +84,8 @@ def overcast(rng: np.random.Generator) -> Light:
 
 
 def night(rng: np.random.Generator) -> Light:
-    """A dark sky, and often the ego's own head lights."""
+    """A dark sky, a little brighter at the horizon, and often the ego's own head lights."""
+    # Over decades, since so do moonlight and a town's glow.
     sky = log_uniform(rng, (3e-5, 3e-4))
     lamps = ego_headlights(rng) if rng.random() < 0.75 else ()
     return Light(0.0, (0.0, 0.0, 1.0), sky, 1.5 * sky, lamps)

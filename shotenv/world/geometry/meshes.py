@@ -21,7 +21,9 @@ P = ParamSpec("P")
 Point = tuple[float, float, float]
 ORIGIN: Point = (0.0, 0.0, 0.0)
 _NEXT, _AFTER = [1, 2, 0], [2, 0, 1]
+"""The two axes that follow x, y and z in turn: factors of a cross product."""
 _ACROSS = np.array([(1, 2), (0, 2), (0, 1)])
+"""The two axes across x, y and z."""
 _PER_FACE = ("albedo_low", "albedo_high", "retro", "emission", "mirror", "clear")
 _CORNERS = np.arange(3)[None, :, None]
 
@@ -157,6 +159,7 @@ def rod(
 ) -> Mesh:
     """A capped cylinder between two points."""
     axis = np.subtract(end, start)
+    # The axis of space that is most across the rod gives the least rounding.
     length = np.linalg.norm(axis)
     side = cross(axis / length, np.eye(3)[np.abs(axis).argmin()])
     side *= radius / np.linalg.norm(side)

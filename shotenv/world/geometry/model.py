@@ -157,6 +157,7 @@ class Light:
 
 
 MAX_LAMPS = 16
+"""Most lamps of a world: renderers keep a table of this length, so that one kernel fits all."""
 
 
 @dataclass(frozen=True)

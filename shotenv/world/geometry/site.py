@@ -27,14 +27,19 @@ from shotenv.world.geometry.weather import DRY, Weather, weathered
 from unwrap.support import Range
 
 STEP_S = 0.04
+"""Time between the instants at which footprints are compared: 0.6 m at 15 m/s."""
 MAX_INSTANTS = 500
+"""Longer clips than 20 s, which are driven more slowly, are compared less often."""
 HEADROOM_M = 2.0
-"""Only what is lower than this can be run into."""
+"""Only what is lower than this can be run into: crowns may hang over a road."""
 EGO_AHEAD_M = 0.5
+"""Nothing is put closer to the camera than this along the road."""
 EGO_BESIDE_M = 1.1
+"""Half the width of the ego vehicle, with its mirrors."""
 GAP_M = 0.15
+"""Between any two things, so that no faces touch."""
 MAX_TRIANGLES = 6000
-"""Things are left out once a world has as many."""
+"""Things are left out once a world has as many: what moves is posed and built for every frame."""
 
 
 class Site:
@@ -65,7 +70,9 @@ class Site:
         self.indoor: Indoor | None = None
         self.room = np.array([[-np.inf, -np.inf], [np.inf, np.inf]])
         self.ceiling_m = np.inf
-        self._taken = [self._ego_footprint()]
+        way = np.array([ego.at(time).position_m[:2] for time in self.times])
+        margin = np.array([EGO_AHEAD_M, EGO_BESIDE_M])
+        self._taken = [np.stack([way - margin, way + margin], axis=1)]
         self._triangles = 0
 
     def enclose(self, x: Range, y: Range, ceiling_m: float) -> None:
@@ -77,15 +84,13 @@ class Site:
         """Length of the ego's path."""
         return self.ego.speed_m_s * self.duration_s
 
-    def build(self, mesh: Mesh) -> None:
-        """Add ground, ceilings and other things that nothing can run into."""
-        self._triangles += len(mesh.corners)
-        self.static.append(weathered(mesh, self.weather))
+    def build(self, mesh: Mesh, sheltered: bool = False) -> None:
+        """Add ground, ceilings and other things that nothing can run into.
 
-    def shelter(self, mesh: Mesh) -> None:
-        """Add ground that rain and snow have left as it is, such as the track of many wheels."""
+        Rain and snow leave what is `sheltered` as it is, such as the track of many wheels.
+        """
         self._triangles += len(mesh.corners)
-        self.static.append(mesh)
+        self.static.append(mesh if sheltered else weathered(mesh, self.weather))
 
     def put(self, mesh: Mesh, x: float, y: float, yaw: float = 0.0, z: float = 0.0) -> bool:
         """Stand a thing at (x, y) on a floor of height `z`; false if there is no room."""
@@ -95,8 +100,11 @@ class Site:
             self.static.append(weathered(meshes.place(mesh, pose), self.weather))
         return free
 
-    def move(self, mesh: Mesh, motion: Motion) -> bool:
-        """Add a thing that moves on its lowest point; false if its way is not free."""
+    def put_moving(self, mesh: Mesh, motion: Motion) -> bool:
+        """Add a thing that moves on its lowest point; false if its way is not free.
+
+        What moves stays dry and bare: rain and snow lie on what stands still.
+        """
         mesh = meshes.grounded(mesh)
         free = self._claim(mesh, [motion.at(time) for time in self.times])
         if free:
@@ -114,10 +122,12 @@ class Site:
         place = lamp.position_m
         if lamp.carrier is not None:
             place = self.moving[lamp.carrier].motion.at(self.duration_s / 2).position_m
+        # The camera looks ahead: lamps a little before it light more of what it sees.
         away = np.subtract(place, (self.travel_m / 2 + 4.0, 0.0, 0.0))
         return not lamp.rides, float(np.linalg.norm(away))
 
     def _claim(self, mesh: Mesh, poses: list[Pose]) -> bool:
+        """Take the ground under a thing at one pose, or at one per instant; false if not free."""
         taken = footprints(mesh, poses)
         inside = (taken[:, 0] >= self.room[0]).all() and (taken[:, 1] <= self.room[1]).all()
         low_enough = poses[0].position_m[2] + mesh.corners[..., 2].max() < self.ceiling_m
@@ -130,11 +140,6 @@ class Site:
         self._triangles += len(mesh.corners)
         return True
 
-    def _ego_footprint(self) -> np.ndarray:
-        centres = np.array([self.ego.at(time).position_m[:2] for time in self.times])
-        margin = np.array([EGO_AHEAD_M, EGO_BESIDE_M])
-        return np.stack([centres - margin, centres + margin], axis=1)
-
 
 def footprints(mesh: Mesh, poses: list[Pose]) -> np.ndarray:
     """Ground rectangles [T, 2, 2] ((low, high), (x, y)) of what is below the headroom."""
@@ -143,6 +148,7 @@ def footprints(mesh: Mesh, poses: list[Pose]) -> np.ndarray:
     (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
     outline = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
     yaw = np.array([pose.yaw_rad for pose in poses])
+    # Transposed, so that rows of points are turned: outline @ turn.
     turn = np.moveaxis(np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]]), -1, 0)
     placed = outline @ turn + np.array([pose.position_m[:2] for pose in poses])[:, None]
     return np.stack([placed.min(axis=1), placed.max(axis=1)], axis=1)

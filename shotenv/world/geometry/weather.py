@@ -16,7 +16,11 @@ from shotenv.world.geometry.model import Mesh
 from unwrap.support import Range
 
 WET_DARKENING = 0.5
+"""Share of the albedo that soaked ground loses."""
+WET_RETRO_LOSS = 0.8
+"""Share of the retro-reflection that it loses: water levels the beads of road paint."""
 FILM_MIRROR = 0.12
+"""Mirrored share of a closed film of water: Fresnel's at 70 degrees from the normal."""
 SNOW_ALBEDO = 0.9
 LEVEL_COS, SETTLING_COS = 0.9, 0.5
 """Cosine of the steepest slope on which water stands, and on which snow stays."""
@@ -45,6 +49,7 @@ def draw_weather(
     rng: np.random.Generator, wet_share: float, snow_share: float, cover: Range
 ) -> Weather:
     """Wet or snowed over with these probabilities, the snow within `cover`; otherwise dry."""
+    # All three are drawn in any weather, so that the draws that follow do not depend on it.
     kind, wetness, snow = rng.random(), rng.uniform(0.4, 1.0), rng.uniform(*cover)
     if kind < wet_share:
         return Weather(wetness=wetness)
@@ -64,7 +69,7 @@ def wetted(mesh: Mesh, wetness: float) -> Mesh:
         mesh,
         albedo_low=mesh.albedo_low * rest,
         albedo_high=mesh.albedo_high * rest,
-        retro=mesh.retro * np.float32(1.0 - 0.8 * amount),
+        retro=mesh.retro * np.float32(1.0 - WET_RETRO_LOSS * amount),
         mirror=np.maximum(mesh.mirror, np.float32(FILM_MIRROR * amount)),
     )
 
@@ -72,6 +77,7 @@ def wetted(mesh: Mesh, wetness: float) -> Mesh:
 def snowed(mesh: Mesh, snow: float) -> Mesh:
     """`mesh` with snow on what faces up; 0 leaves it as it is."""
     settles = _upward(mesh) > SETTLING_COS
+    # Bright spots of the texture turn white until half the cover, dark ones from there on.
     on_bright = np.float32(settles * min(1.0, 2.0 * snow))
     on_dark = np.float32(settles * max(0.0, 2.0 * snow - 1.0))
     bare = np.float32(1.0 - settles * snow)

@@ -119,6 +119,7 @@ def guard_rail(rng: np.random.Generator, length_m: float) -> Mesh:
         meshes.box((0.08, 0.12, 0.7), metal, (-0.06, y, 0.0))
         for y in np.arange(-length_m / 2 + 0.5, length_m / 2, 4.0)
     ]
+    # The W of a crash barrier, as two beams before a web.
     beams = [meshes.box((0.05, length_m, 0.12), metal, (0.02, 0.0, z)) for z in (0.45, 0.61)]
     return meshes.join(
         [*posts, *beams, meshes.box((0.03, length_m, 0.05), metal, (0.0, 0.0, 0.565))]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shotenv.world.geometry import Material, Mesh, materials as m, meshes
+from shotenv.world.geometry import Mesh, materials as m, meshes
 from shotenv.world.things.wheels import wheel
 
 
@@ -15,7 +15,8 @@ def lorry(
     """A cab before a box body or a tarpaulin, marked with retro-reflecting tape at its rear."""
     length, width, height = rng.uniform(6.0, 8.5), rng.uniform(2.2, 2.45), rng.uniform(2.9, 3.5)
     front, rear = length / 2, -length / 2
-    load, load_length = _load_material(rng), length - 2.0
+    load = (m.WHITE_PAINT, m.METAL, m.CLOTHES, m.PLASTIC)[rng.integers(4)].draw(rng)
+    load_length = length - 2.0
     middle = rear + load_length / 2
     radius = rng.uniform(0.40, 0.48)
     axles = (front - 0.8, rear + 1.3) if length < 7.0 else (front - 0.8, rear + 1.1, rear + 2.2)
@@ -26,13 +27,9 @@ def lorry(
             cab(rng, front, width - 0.1),
             *_wheels(rng, axles, width / 2, radius),
             nose_lamps(rng, front + 0.012, width, headlight_radiance),
-            tail(rng, rear, width, height, tail_radiance),
+            lorry_tail(rng, rear, width, height, tail_radiance),
         ]
     )
-
-
-def _load_material(rng: np.random.Generator) -> Material:
-    return (m.WHITE_PAINT, m.METAL, m.CLOTHES, m.PLASTIC)[rng.integers(4)].draw(rng)
 
 
 def cab(rng: np.random.Generator, front: float, width: float) -> Mesh:
@@ -69,7 +66,7 @@ def nose_lamps(rng: np.random.Generator, x: float, width: float, radiance: float
     )
 
 
-def tail(
+def lorry_tail(
     rng: np.random.Generator, rear: float, width: float, height: float, radiance: float
 ) -> Mesh:
     """Contour tape, under-run bar, tail lamps and number plate."""
@@ -115,34 +112,30 @@ def bus(
         meshes.box((0.12, 0.8, 0.55), cloth, (x, y, sill - 0.1))
         for x in bays[1:-1] for y in (-0.65, 0.65)
     ]  # fmt: skip
-    ends = [(-front, 0.02 - half), (front, half - 0.02)]
+    # Inside the posts, which would cut through them.
+    sides = [
+        meshes.polygon([(-front, y, sill), (front, y, sill), (front, y, top), (-front, y, top)],
+                       glass)
+        for y in (0.03 - half, half - 0.03)
+    ]  # fmt: skip
     return meshes.join(
         [
             meshes.box((length, width, sill - 0.3), paint, (0.0, 0.0, 0.3)),
             meshes.box((length, width, 0.3), roof, (0.0, 0.0, top)),
             *posts,
             *rows,
-            *(_side_pane(ends[0][0], ends[1][0], y, (sill, top), glass) for y in (-half, half)),
+            *sides,
             meshes.front((-half + 0.1, half - 0.1), (sill, top), front, glass),
             meshes.back((-half + 0.1, half - 0.1), (sill, top), -front, glass),
             *_wheels(rng, (-0.28 * length, 0.28 * length), half, 0.46),
             nose_lamps(rng, front + 0.012, width, headlight_radiance),
-            _bus_tail(rng, -front - 0.012, half, tail_radiance),
+            bus_tail(rng, -front - 0.012, half, tail_radiance),
         ]
     )
 
 
-def _side_pane(
-    rear: float, front: float, y: float, z: tuple[float, float], glass: Material
-) -> Mesh:
-    inner = y - np.sign(y) * 0.03
-    return meshes.polygon(
-        [(rear, inner, z[0]), (front, inner, z[0]), (front, inner, z[1]), (rear, inner, z[1])],
-        glass,
-    )
-
-
-def _bus_tail(rng: np.random.Generator, x: float, half: float, radiance: float) -> Mesh:
+def bus_tail(rng: np.random.Generator, x: float, half: float, radiance: float) -> Mesh:
+    """Tail lamps, number plate and the engine's grille."""
     lamp = m.LENS.draw(rng).glowing(radiance)
     spans = [(-half + 0.08, -half + 0.3), (half - 0.3, half - 0.08)]
     return meshes.join(

@@ -32,6 +32,7 @@ def somebody(rng: np.random.Generator, speed_m_s: float, wetness: float = 0.0) -
     kind = rng.random()
     if kind < 0.04 + 0.4 * wetness:
         return umbrella(rng, speed_m_s)
+    # `and` draws for those who stand only: taken out of it, the draw would change every world.
     if speed_m_s == 0.0 and rng.random() < 0.2:
         return crouching(rng)
     draw = (adult, child, pushchair, dog_walker, suitcase)[
@@ -59,6 +60,7 @@ def figure(
     rng: np.random.Generator, height_m: float, stride_m: float = 0.0, reach_m: float = 0.0
 ) -> Mesh:
     """A person of this height; children have larger heads."""
+    # Limbs are drawn for 1.75 m; a stride stays as long as asked for.
     scale = height_m / 1.75
     phase, stride = rng.uniform(-np.pi, np.pi), stride_m / scale
     parts = [
@@ -78,6 +80,7 @@ def legs(rng: np.random.Generator, stride_m: float, phase_rad: float) -> Mesh:
     parts = []
     for side in (-1, 1):
         foot, y = side * stride_m / 2 * np.cos(phase_rad), side * 0.10
+        # Feet are farthest apart at phase 0; where they pass each other, one of them is up.
         lift = 0.25 * stride_m * max(0.0, side * np.sin(phase_rad))
         knee = foot / 2 + 0.03 + 0.8 * lift
         parts += [
@@ -100,6 +103,7 @@ def torso(rng: np.random.Generator, base: meshes.Point) -> Mesh:
         (0.0, 0.70),
     ]
     cloth = clothes(rng)
+    # A body of revolution, pressed flat at the end together with its stripe.
     parts = [meshes.lathe(profile, cloth, sections=10)]
     if rng.random() < 0.15:
         stripe = [(0.192, 0.30), (0.205, 0.36)]

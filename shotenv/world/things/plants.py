@@ -72,7 +72,10 @@ def hedge(rng: np.random.Generator, length_m: float) -> Mesh:
     lumps = [
         meshes.blob(rng, 0.45, leaves, (0.1, y, height * h), detail=1)
         for y, h in zip(
-            np.arange(-length_m / 2, length_m / 2, 0.8), rng.uniform(0.3, 0.8, 99), strict=False
+            # 99 draws whatever the length, more than any hedge has lumps.
+            np.arange(-length_m / 2, length_m / 2, 0.8),
+            rng.uniform(0.3, 0.8, 99),
+            strict=False,
         )
     ]
     return meshes.join([meshes.box((0.7, length_m, height), leaves), *lumps])
@@ -117,6 +120,7 @@ def blades(
     foot = rng.uniform(0.0, 0.6, (count, 1)) * outwards
     tip = foot + rng.uniform(0.3, 1.0, (count, 1)) * outwards
     side = 0.12 * outwards[:, ::-1] * np.array([-1.0, 1.0])
+    # One triangle each: leaves by the thousand would use up the budget of triangles.
     corners = np.zeros((count, 3, 3))
     corners[..., :2] = np.stack([foot - side, foot + side, tip], axis=1)
     corners[:, 2, 2] = height_m * rng.uniform(0.6, 1.0, count)

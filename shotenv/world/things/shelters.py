@@ -81,6 +81,7 @@ def shop_front(rng: np.random.Generator, length_m: float, radiance: float = 0.0)
         ),
         *(goods(rng, (-rng.uniform(0.5, room - 0.4), y, 0.30)) for y in posts[:-1] + 0.9),
     ]
+    # Upstairs panes are dark and opaque: nobody looks in from the street, and panes cost rays.
     upper = [meshes.front((y - 0.5, y + 0.5), (3.9, 5.2), 0.012, m.GLASS.draw(rng)) for y in posts]
     return meshes.join([*parts, *upper[1:-1]])
 

@@ -15,7 +15,7 @@ Profile = list[tuple[float, float]]
 
 @dataclass(frozen=True)
 class CarShape:
-    """Outline of a car in metres: lower body and cabin as (x, z) profiles."""
+    """Outline of a car in metres: lower body and cabin as (x, z) profiles, counter-clockwise."""
 
     length: float
     width: float
@@ -81,6 +81,7 @@ def car(
         Radiance of the lamps' faces, W m-2 sr-1; 0 is off.
     """
     shape, paint = saloon_shape(rng), car_paint(rng)
+    # Glass to look through, with seats behind it: two surfaces in one pixel, as on real roads.
     glass = (m.CLEAR_GLASS if rng.random() < 0.7 else m.TINTED_GLASS).draw(rng)
     inside = [hollow_cabin(shape, paint, glass), seats(rng, shape)]
     return meshes.join([*inside, chassis(rng, shape, paint, headlight_radiance, tail_radiance)])
@@ -94,6 +95,7 @@ def van(
     shape, paint = van_shape(rng), car_paint(rng)
     cargo = meshes.extrude(shape.cabin, shape.cabin_width, paint)
     panes = meshes.join(
+        # Opaque panes a little off the sheet metal: what is behind them is not built.
         meshes.polygon(meshes.inset(outline, 0.16, 0.01), m.GLASS.draw(rng))
         for outline in outlines(shape, rear_share=0.66)[: 2 if rng.random() < 0.6 else 6]
     )
@@ -130,6 +132,7 @@ def outlines(shape: CarShape, rear_share: float = 0.5) -> list[list[meshes.Point
     sides = [(low, nose, front_roof, high), (rear, low, high, rear_roof)]
     right = [[(x, -half, z) for x, z in side] for side in sides]
     left = [[(x, half, z) for x, z in side[::-1]] for side in sides]
+    # Corners counter-clockwise seen from outside, hence the turned order on the left.
     across = [_screen(nose, front_roof, half), _screen(rear_roof, rear, half)]
     return [across[0], right[0], left[0], across[1], right[1], left[1]]
 
@@ -182,7 +185,7 @@ def wheels(rng: np.random.Generator, shape: CarShape) -> Mesh:
 
 
 def front_trim(rng: np.random.Generator, shape: CarShape, radiance: float) -> Mesh:
-    """Head lamps, grille and number plate."""
+    """Head lamps, grille and number plate, a little before the body so that they are seen."""
     x, half = shape.length / 2 + 0.012, shape.width / 2
     lamp = m.LENS.draw(rng).glowing(radiance)
     high = shape.body[4][1]

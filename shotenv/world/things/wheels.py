@@ -12,6 +12,7 @@ from shotenv.world.geometry import Material, Mesh, meshes
 def wheel(x: float, side: int, half: float, radius: float, tyre: Material, rim: Material) -> Mesh:
     """A tyre that looks 2 cm out of a body's side, at `half` of its width, and its rim."""
     outer, inner = side * (half + 0.02), side * (half - 0.20)
+    # Counter-clockwise seen from outside, on either side.
     turns = np.linspace(0, 2 * np.pi, 8, endpoint=False) * -side
     disc = [
         (x + 0.62 * radius * np.cos(a), outer + side * 0.008, radius + 0.62 * radius * np.sin(a))

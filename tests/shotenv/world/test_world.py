@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from drawn_worlds import CLIP, EVERY, SPARSE, a_box, drawn_worlds, numbers
+from drawn_worlds import CLIP, EVERY, SPARSE, arrays_of, drawn_worlds, plain_box
 
 from shotenv.config.bank import WorldConfig
 from shotenv.config.families import FAMILIES
@@ -74,7 +74,7 @@ def views(drawn):
 def digest(world):
     """Every number of a world, hashed."""
     parts = [world.static, *(thing.mesh for thing in world.moving)]
-    arrays = [array.tobytes() for mesh in parts for array in numbers(mesh)]
+    arrays = [array.tobytes() for mesh in parts for array in arrays_of(mesh)]
     rest = repr(
         (sorted(world.kinds), world.light, world.ego, [thing.motion for thing in world.moving])
     ).encode()
@@ -116,7 +116,7 @@ def test_seeds_families_and_clips_differ(drawn):
 def test_numbers_are_finite_and_in_range(drawn):
     for _, world in drawn:
         for mesh in (world.static, *(thing.mesh for thing in world.moving)):
-            for array in numbers(mesh):
+            for array in arrays_of(mesh):
                 assert array.dtype == np.float32
                 assert np.isfinite(array).all()
             assert (mesh.albedo_low >= 0).all()
@@ -258,24 +258,26 @@ def test_motion_is_the_closed_form_of_an_arc(rate):
 
 def test_site_keeps_the_way_and_the_ground_free():
     site = Site(Motion(Pose((0.0, 0.0, 1.0)), 10.0), 1.0)
-    assert not site.put(a_box(), 5.0, 0.0)
-    assert site.put(a_box(), 5.0, 3.0)
-    assert not site.put(a_box(), 5.5, 3.5)
-    assert not site.move(a_box(), Motion(Pose((5.0, -6.0, 0.0), np.pi / 2), 12.0))
-    assert site.move(a_box(), Motion(Pose((5.0, -6.0, 0.0), -np.pi / 2), 12.0))
+    assert not site.put(plain_box(), 5.0, 0.0)
+    assert site.put(plain_box(), 5.0, 3.0)
+    assert not site.put(plain_box(), 5.5, 3.5)
+    assert not site.put_moving(plain_box(), Motion(Pose((5.0, -6.0, 0.0), np.pi / 2), 12.0))
+    assert site.put_moving(plain_box(), Motion(Pose((5.0, -6.0, 0.0), -np.pi / 2), 12.0))
     assert len(site.static) == 1
     assert len(site.moving) == 1
 
 
 def test_site_lets_crowns_hang_over_and_rooms_end():
     site = Site(Motion(Pose((0.0, 0.0, 1.0)), 0.0), 1.0)
-    post = meshes.join([a_box((0.2, 0.2, 3.0)), meshes.at(a_box((4.0, 4.0, 1.0)), 0.0, 0.0, 3.0)])
+    post = meshes.join(
+        [plain_box((0.2, 0.2, 3.0)), meshes.at(plain_box((4.0, 4.0, 1.0)), 0.0, 0.0, 3.0)]
+    )
     assert site.put(post, 2.0, 0.0)
-    assert site.put(a_box(), 3.0, 0.0)
+    assert site.put(plain_box(), 3.0, 0.0)
     site.enclose((-10.0, 8.0), (-3.0, 3.0), 2.5)
-    assert not site.put(a_box(), 8.0, 0.0)
-    assert not site.put(a_box((1.0, 1.0, 2.6)), 5.0, 2.0)
-    assert site.put(a_box(), 5.0, 2.0)
+    assert not site.put(plain_box(), 8.0, 0.0)
+    assert not site.put(plain_box((1.0, 1.0, 2.6)), 5.0, 2.0)
+    assert site.put(plain_box(), 5.0, 2.0)
 
 
 @pytest.mark.parametrize(

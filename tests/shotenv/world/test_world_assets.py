@@ -1,12 +1,15 @@
 """The things that worlds are made of."""
 
 from functools import partial
-from inspect import signature
+from importlib import import_module
+from inspect import isfunction, signature
+from pkgutil import iter_modules
 
 import numpy as np
 import pytest
-from drawn_worlds import a_box
+from drawn_worlds import plain_box
 
+from shotenv.world import families, things
 from shotenv.world.families import construction, forest, snow, warehouse
 from shotenv.world.geometry import materials as m, meshes
 from shotenv.world.things import (
@@ -52,10 +55,32 @@ SIZED = {
     warehouse.pallet_rack: 3,
     construction.unfinished_wall: 6.0,
 }
-DRAWS = {draw.__name__: draw for draw in ASSETS} | {
-    draw.__name__: partial(draw, **{list(signature(draw).parameters)[1]: size})
-    for draw, size in SIZED.items()
-}
+DRAWS = (
+    {draw.__name__: draw for draw in ASSETS}
+    | {
+        draw.__name__: partial(draw, **{list(signature(draw).parameters)[1]: size})
+        for draw, size in SIZED.items()
+    }
+    | {
+        "light_tower": partial(construction.light_tower, height_m=4.0, radiance=0.5),
+        "wall": partial(buildings.wall, length_m=8.0, height_m=1.5),
+    }
+)
+
+
+def marked_as_things():
+    """Names of all functions of both rooms that `meshes.thing` has wrapped."""
+    for room in (things, families):
+        for file in iter_modules(room.__path__):
+            module = import_module(f"{room.__name__}.{file.name}")
+            for function in vars(module).values():
+                own = isfunction(function) and function.__module__ == module.__name__
+                if own and hasattr(function, "__wrapped__"):
+                    yield function.__name__
+
+
+def test_every_thing_is_among_those_tested_here():
+    assert set(marked_as_things()) == set(DRAWS)
 
 
 @pytest.mark.parametrize("name", DRAWS)
@@ -73,7 +98,7 @@ def test_assets_stand_on_the_ground(name):
 def test_solids_have_their_volume_and_face_outwards():
     rng = np.random.default_rng(0)
     solids = {
-        1.0 * 2.0 * 3.0: a_box((1.0, 2.0, 3.0)),
+        1.0 * 2.0 * 3.0: plain_box((1.0, 2.0, 3.0)),
         0.5 * 8 * np.sin(2 * np.pi / 8) * 0.25 * 2.0: meshes.rod(
             (0, 0, 1), (2, 0, 1), 0.5, m.SOIL.draw(rng)
         ),

@@ -1,16 +1,18 @@
 """What each family shows: kinds of things, weather, low sun, lamps, reflectors."""
 
 from collections import Counter
+from typing import get_args
 
 import numpy as np
 import pytest
-from drawn_worlds import CLIP, EVERY, drawn_worlds, numbers
+from drawn_worlds import CLIP, EVERY, arrays_of, drawn_worlds
 
-from shotenv.config.families import FAMILIES
+from shotenv.config.families import FAMILIES, Family
 from shotenv.config.reader import find_config, read_config
 from shotenv.config.sensor import SensorConfig
 from shotenv.sensor.electrons import electrons_per_radiance_second
-from shotenv.world.draw import SETTINGS, draw_world
+from shotenv.world.draw import draw_world
+from shotenv.world.families.settings import SETTINGS
 from shotenv.world.geometry import lights, materials as m, meshes, weather
 from shotenv.world.things import furniture
 
@@ -75,6 +77,13 @@ def test_training_families_show_what_the_road_has_to_offer(kinds):
     }  # fmt: skip
 
 
+def test_every_family_has_its_setting_whose_shares_add_up_to_one():
+    assert tuple(SETTINGS) == EVERY == get_args(Family)
+    for family, setting in SETTINGS.items():
+        assert sum(place.share for place in setting.places) == pytest.approx(1.0), family
+        assert setting.wet_share + setting.snow_share <= 1.0
+
+
 def weathers(family, count=200):
     """Light and weather alone of many worlds: (low sun, wet, snowy) shares."""
     setting, rng = SETTINGS[family], np.random.default_rng(3)
@@ -101,7 +110,7 @@ def bench_mesh():
 
 def test_dry_weather_changes_nothing(bench_mesh):
     dry = weather.weathered(bench_mesh, weather.DRY)
-    assert all((a == b).all() for a, b in zip(numbers(dry), numbers(bench_mesh), strict=True))
+    assert all((a == b).all() for a, b in zip(arrays_of(dry), arrays_of(bench_mesh), strict=True))
 
 
 def test_wet_ground_is_darker_and_mirrors():
@@ -159,6 +168,11 @@ def test_moving_vehicles_carry_their_head_lights(drawn):
 
 
 def test_dark_worlds_alone_have_their_street_lamps_on(drawn):
-    for _, world in drawn:
-        if world.light.indoor is None:
-            assert bool(world.light.lamps) <= lights.is_dark(world.light)
+    lit = {False: 0, True: 0}
+    for light, kinds in ((w.light, w.kinds) for _, w in drawn if w.light.indoor is None):
+        dark, posts = lights.is_dark(light), {"lamp_post", "light_tower"} & kinds
+        assert dark or not light.lamps
+        assert any(lamp.position_m[2] > 3.0 for lamp in light.lamps) == bool(dark and posts)
+        lit[dark] += bool(posts)
+    # Posts stand by day as well, and are off.
+    assert min(lit.values()) > 0

@@ -1,0 +1,116 @@
+"""What each family is drawn from: its places, its light, its weather. One row per family."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from shotenv.config import Family
+from shotenv.world.families import construction, enclosed, forest, roads, snow, warehouse
+from shotenv.world.geometry import Light, Site, lights
+from unwrap.support import Range
+
+DrawLight = Callable[[np.random.Generator], Light]
+
+
+@dataclass(frozen=True)
+class Place:
+    """A kind of place.
+
+    Attributes
+    ----------
+    lay_out : callable
+        Builds and furnishes a site.
+    speed_m_s : (low, high)
+        Usual speed of the ego there, drawn uniformly.
+    share : float
+        How often a family's world is of this kind; the shares of a family add up to 1.
+    yaw_std_rad : float
+        Standard deviation of the ego's heading off the lane: small in lanes, larger in car parks.
+    """
+
+    lay_out: Callable[[Site, np.random.Generator], None]
+    speed_m_s: Range
+    share: float
+    yaw_std_rad: float
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What the worlds of a family are drawn from.
+
+    Attributes
+    ----------
+    places : tuple of Place
+    light : callable
+        Draws sun and sky; lamps of streets and ceilings come with the place.
+    wet_share, snow_share : float
+        Shares of the worlds after rain, and after snow.
+    snow_cover : (low, high)
+        Cover of the snowy ones: 0 is none, 1 is closed.
+    """
+
+    places: tuple[Place, ...]
+    light: DrawLight
+    wet_share: float = 0.0
+    snow_share: float = 0.0
+    snow_cover: Range = (0.3, 0.7)
+
+
+def sun_night_or_clouds(sun_share: float, low_share: float, night_share: float = 0.0) -> DrawLight:
+    """Sun (low with probability `low_share` of those), night, or else an overcast sky."""
+
+    def draw(rng: np.random.Generator) -> Light:
+        kind = rng.random()
+        if kind < sun_share:
+            return lights.sunny(rng, low_share)
+        return lights.night(rng) if kind < sun_share + night_share else lights.overcast(rng)
+
+    return draw
+
+
+def open_places(country: float, town: float, park: float) -> tuple[Place, ...]:
+    """Country roads, town streets and car parks with these shares."""
+    return (
+        Place(roads.lay_out_country_road, (2.0, 15.0), country, 0.02),
+        Place(roads.lay_out_town_street, (0.5, 10.0), town, 0.02),
+        Place(roads.lay_out_car_park, (0.0, 1.2), park, 0.15),
+    )
+
+
+# Under a roof the light is the overcast sky seen through an opening, and weather stays outside.
+SETTINGS: dict[Family, Setting] = {
+    "sunny_road": Setting(open_places(0.50, 0.25, 0.25), lights.sunny, wet_share=0.15),
+    "overcast_street": Setting(
+        open_places(0.10, 0.60, 0.30), lights.overcast, wet_share=0.40, snow_share=0.12
+    ),
+    "garage": Setting((Place(enclosed.lay_out_garage, (0.0, 3.0), 1.0, 0.1),), lights.overcast),
+    "tunnel": Setting(
+        (Place(enclosed.lay_out_tunnel, (2.0, 15.0), 1.0, 0.02),), sun_night_or_clouds(0.6, 0.3)
+    ),
+    "night_road": Setting(
+        open_places(0.40, 0.35, 0.25), lights.night, wet_share=0.40, snow_share=0.08
+    ),
+    # From here on held out from training: `shotenv.config.families.SHIFT_FAMILIES`.
+    "warehouse": Setting(
+        (Place(warehouse.lay_out_warehouse, (0.0, 3.0), 1.0, 0.1),), lights.overcast
+    ),
+    "construction_site": Setting(
+        (Place(construction.lay_out_construction_site, (0.0, 6.0), 1.0, 0.05),),
+        sun_night_or_clouds(0.5, 0.3, night_share=0.25),
+        wet_share=0.3,
+    ),
+    "forest_path": Setting(
+        (Place(forest.lay_out_forest_path, (0.0, 4.0), 1.0, 0.05),),
+        sun_night_or_clouds(0.6, 0.5),
+        wet_share=0.2,
+    ),
+    "snowy_street": Setting(
+        (Place(snow.lay_out_snowy_street, (0.0, 8.0), 1.0, 0.03),),
+        sun_night_or_clouds(0.5, 0.7, night_share=0.2),
+        snow_share=1.0,
+        snow_cover=(0.7, 1.0),
+    ),
+}
