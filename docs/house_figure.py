@@ -147,7 +147,7 @@ VALUES: dict[str, tuple[float, float]] = {
 
 
 def rooms_of_the_test() -> tuple[str, ...]:
-    """All rooms inside the three folders, from the table of `tests/architecture/test_imports.py`."""
+    """Rooms inside the three folders, from the table of `test_imports.py`."""
     path = ROOT / "tests" / "architecture" / "test_imports.py"
     spec = spec_from_file_location(path.stem, path)
     assert spec is not None and spec.loader is not None
