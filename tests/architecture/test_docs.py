@@ -169,14 +169,15 @@ def map_of_the_house() -> dict[str, str]:
 
 @pytest.mark.parametrize("new", map_of_the_house())
 def test_the_map_names_files_that_have_what_it_says(new):
-    """Each name of a row stands in a file, or a folder's files, that the row names."""
+    """Each name of a row is defined in a file, or a folder's files, that the row names."""
     words = re.findall(r"`([^`]+)`", map_of_the_house()[new])
-    places = [ROOT / word for word in words if "/" in word]
+    places = [ROOT / word for word in words if "/" in word and (ROOT / word).exists()]
     files = [f for p in places for f in (p.rglob("*.py*") if p.is_dir() else [p])]
-    said = " ".join(file.read_text("utf-8") for file in files if file.suffix in (".py", ".pyi"))
+    said = "\n".join(file.read_text("utf-8") for file in files if file.suffix in (".py", ".pyi"))
     names = [word for word in words if re.fullmatch(r"\w+", word) and not (ROOT / word).exists()]
     assert places
-    assert [name for name in names if not re.search(rf"\b{name}\b", said)] == []
+    defined = r"^\s*(?:(?:def|class) {0}\b|{0}(?:: [^=\n]+)? = |{0}: )"
+    assert [n for n in names if not re.search(defined.format(n), said, re.MULTILINE)] == []
 
 
 def test_the_map_tells_where_new_things_go():
