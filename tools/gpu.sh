@@ -11,7 +11,7 @@ folder=${1:?folder of the results}
 table=${2:-configs/unwrap/table-gpu.yaml}
 groups=(tofregnet tofsegnet "su_net phasenet agresti_net chen_net toffusionnet")
 
-run() { python3 -m agents.cli.entry "$@"; }
+run() { python3 -m agents.cli "$@"; }
 export SHOTENV_MITSUBA_VARIANT=${SHOTENV_MITSUBA_VARIANT:-cuda_ad_mono}
 mkdir -p "$folder"
 run render --config configs/bank/nearfield.yaml

@@ -20,11 +20,16 @@ from figures.stage import (
     label,
     phase_of,
 )
-from unwrap.depth.dual import unwrap_dual
-from unwrap.signal.decoding import TWO_PI, decode
-from unwrap.signal.frequencies import candidate_spacing_m, unambiguous_range_m
-from unwrap.signal.shots import harmonic_weights
-from unwrap.signal.wiggle import correlation_samples, wiggle_of
+from unwrap.depth import unwrap_dual
+from unwrap.signal import (
+    TWO_PI,
+    candidate_spacing_m,
+    correlation_samples,
+    decode,
+    harmonic_weights,
+    unambiguous_range_m,
+    wiggle_of,
+)
 
 
 def wiggle() -> Made:

@@ -20,10 +20,16 @@ from figures.stage import (
     axes,
     label,
 )
+from shotenv.laser import (
+    ENERGY_PARTS,
+    ShotCost,
+    efficiency_at,
+    emitted_power_w,
+    laser_step,
+    shot_cost,
+    start_laser,
+)
 from shotenv.laser.ageing import ageing_rate
-from shotenv.laser.cost import ENERGY_PARTS, ShotCost
-from shotenv.laser.energy import efficiency_at, emitted_power_w, shot_cost
-from shotenv.laser.laser_state import laser_step, start_laser
 from unwrap import load_unwrapper
 
 PERIOD_S, AMBIENT_K = 0.1, 307.15

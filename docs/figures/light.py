@@ -35,12 +35,9 @@ from figures.stage import (
     wall_return,
     world,
 )
-from shotenv.sensor.electrons import electrons_per_radiance_second
-from shotenv.sensor.exposure import Exposure
+from shotenv.sensor import Exposure, electrons_per_radiance_second
 from shotenv.world.geometry.meshes import join
-from unwrap.signal.decoding import TWO_PI, decode, distance_m
-from unwrap.signal.frequencies import unambiguous_range_m
-from unwrap.signal.shots import Shots
+from unwrap.signal import TWO_PI, Shots, decode, distance_m, unambiguous_range_m
 
 
 def _wrapped_m(correlation: np.ndarray) -> np.ndarray:

@@ -31,14 +31,18 @@ from figures.stage import (
     world,
 )
 from shotenv.config.reader import merged
-from shotenv.sensor.drift import distance_drift_m, residual_drift_m
-from shotenv.sensor.electrons import electrons_per_radiance_second
-from shotenv.sensor.gray import capture_gray, gray_gain_lsb_per_e
-from shotenv.sensor.noise import Purpose, draw_noise, stream
-from shotenv.sensor.offsets import draw_offsets
-from unwrap.signal.decoding import decode, distance_m
-from unwrap.signal.frequencies import unambiguous_range_m
-from unwrap.signal.shots import Shots
+from shotenv.sensor import (
+    Purpose,
+    capture_gray,
+    draw_offsets,
+    electrons_per_radiance_second,
+    gray_gain_lsb_per_e,
+    residual_drift_m,
+    stream,
+)
+from shotenv.sensor.drift import distance_drift_m
+from shotenv.sensor.noise import draw_noise
+from unwrap.signal import Shots, decode, distance_m, unambiguous_range_m
 from unwrap.signal.wiggle import shifted
 
 

@@ -11,22 +11,22 @@ import torch
 from matplotlib.figure import Figure
 from torch import Tensor
 
-from shotenv.config.bank import CameraConfig
-from shotenv.config.laser import LaserConfig
-from shotenv.config.reader import find_config, read_config
-from shotenv.config.sensor import SensorConfig
-from shotenv.render.frame import RenderedFrame, render_frame
-from shotenv.sensor.acquisition import expose
-from shotenv.sensor.electrons import electrons_per_radiance_second
-from shotenv.sensor.exposure import Exposure
-from shotenv.sensor.offsets import OffsetPattern
-from shotenv.world.geometry.materials import Material
+from shotenv.config import CameraConfig, LaserConfig, SensorConfig, find_config, read_config
+from shotenv.render import RenderedFrame, render_frame
+from shotenv.sensor import Exposure, OffsetPattern, electrons_per_radiance_second, expose
+from shotenv.world.geometry import Light, Material, Mesh, Motion, Pose, World
 from shotenv.world.geometry.meshes import polygon
-from shotenv.world.geometry.model import Light, Mesh, Motion, MovingObject, Pose, World
-from unwrap.signal.decoding import SPEED_OF_LIGHT_M_S, TWO_PI
-from unwrap.signal.frames import RawFrame
-from unwrap.signal.frequencies import unambiguous_range_m
-from unwrap.signal.shots import Shots, demodulation_phase_rad, frequency_index, harmonic_weights
+from shotenv.world.geometry.model import MovingObject
+from unwrap.signal import (
+    TWO_PI,
+    RawFrame,
+    Shots,
+    demodulation_phase_rad,
+    frequency_index,
+    harmonic_weights,
+    unambiguous_range_m,
+)
+from unwrap.signal.frequencies import SPEED_OF_LIGHT_M_S
 
 SENSOR = read_config(SensorConfig, find_config("sensor", "epc660"))
 LASER = read_config(LaserConfig, find_config("laser", "vcsel_detailed"))

@@ -1,0 +1,68 @@
+"""The README's code and the examples run as they stand, here with small banks and made samples."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import gymnasium
+import pytest
+import torch
+
+from unwrap import unambiguous_range_m
+
+ROOT = Path(__file__).parents[2]
+README = re.findall(
+    r"^```python\n(.*?)^```", (ROOT / "README.md").read_text("utf-8"), re.MULTILINE | re.DOTALL
+)
+F1_HZ = 24e6
+
+
+@pytest.fixture
+def small_env(monkeypatch, tiny_bank, tiny_unwrapper):
+    """`gymnasium.make` with a bank that needs no rendering, and short drives."""
+    make, small = gymnasium.make, {"unwrapper": tiny_unwrapper, "frames_per_drive": 3}
+
+    def make_small(name, **chosen):
+        assert chosen.pop("bank") == "starter"
+        return make(name, bank=tiny_bank, **small, **chosen)
+
+    monkeypatch.setattr(gymnasium, "make", make_small)
+
+
+def code_with(word: str) -> str:
+    """The README's only block of Python that has a word."""
+    (code,) = (block for block in README if word in block)
+    return code
+
+
+def test_the_first_lines_of_the_readme_run(small_env, capsys):
+    exec(code_with("gym.make("), {})
+    rows = capsys.readouterr().out.splitlines()
+    assert len(rows) == 3
+    assert all(row.split()[0] in ("0", "2", "4", "8") for row in rows)
+
+
+def test_the_quickstart_runs(small_env, capsys):
+    exec((ROOT / "examples" / "quickstart.py").read_text("utf-8"), {})
+    *rows, last = capsys.readouterr().out.splitlines()
+    assert len(rows) == 3
+    assert re.fullmatch(r"return -\d+\.\d", last)
+
+
+@pytest.mark.parametrize("samples", [2, 4])
+def test_unwrapping_alone_runs_as_the_readme_says(samples):
+    """Samples of a made wall: its depth is right but for whole wraps, which the network tells."""
+    wall_m, wrap_m = torch.linspace(1.0, 5.0, 160).expand(1, 120, 160), unambiguous_range_m(F1_HZ)
+    angles = torch.tensor([0.0, 0.5, 1.0, 1.5])[:samples, None, None] * math.pi
+    made = {
+        "dcs": 100 * torch.cos(2 * math.pi * wall_m[:, None] / wrap_m - angles),
+        "gray": torch.full((1, 120, 160), 1200, dtype=torch.uint16),
+    }
+    exec(code_with("load_unwrapper"), made)
+    torch.testing.assert_close(made["wrapped_m"], wall_m.contiguous(), atol=1e-3, rtol=0)
+    assert made["coarse_m"].shape == wall_m.shape
+    wraps = (made["depth_m"] - wall_m) / wrap_m
+    torch.testing.assert_close(wraps, wraps.round(), atol=1e-3, rtol=0)
+    assert ((made["depth_m"] - made["coarse_m"]).abs() <= wrap_m).all()
