@@ -212,11 +212,13 @@ STATE_FEATURES = (
 FEATURES = (*SCENE_FEATURES, *SEEN_FEATURES, *STATE_FEATURES)
 """All features, in the order of the observation."""
 FEATURE_NAMES = tuple(feature.name for feature in FEATURES)
-TOLD = {
-    shots: torch.tensor([feature.least_shots <= shots for feature in SEEN_FEATURES])
-    for shots in Shots
-}
-"""Which of the `SEEN_FEATURES` a number of samples tells, bool [S]."""
+TOLD = torch.tensor(
+    [
+        [feature.least_shots <= shots for feature in SEEN_FEATURES]
+        for shots in range(Shots.EIGHT + 1)
+    ]
+)
+"""Which of the `SEEN_FEATURES` each number of samples tells, bool [9, S]; none without any."""
 
 
 def evaluated(features: Sequence[Feature], seen: Scene | Sums | Now) -> Tensor:
