@@ -81,7 +81,9 @@ def draw_drive(
     Laser power and integration time are drawn log-uniformly, the ambient temperature uniformly,
     and the laser starts between ambient and the temperature at which it would be released.
     """
+    # A stream for each purpose: a longer layout does not change the laser that is drawn.
     layout, body = stream(Purpose.DRIVE, seed, 0), stream(Purpose.DRIVE, seed, 1)
+    # One frame more than are played: the last step, too, is followed by an observation.
     frames = chain_clips(clips, config.frames_per_drive + 1, generator=layout)
     unit = torch.rand(4, dtype=torch.float64, generator=body)
     laser_power_w = _log_uniform(config.laser.optical_power_w, unit[0:1])
@@ -105,6 +107,7 @@ def draw_drive(
         sensitivity=sensitivity(config.sensor, laser_power_w, integration_s),
         offsets=offsets,
         drift_m=residual_drift_m(config.sensor, imager_k),
+        # The most there is: the reward's terms must not leave 0..1 however warm the laser is.
         always_eight=shot_cost(
             torch.tensor([int(Shots.EIGHT)]),
             config.laser,

@@ -166,6 +166,7 @@ def recently(since: Tensor) -> Tensor:
     return 1.0 - torch.exp(since / -16.0)
 
 
+# One line for each, however long: name and formula are read together.
 # fmt: off
 SCENE_FEATURES = (
     Feature("gray_mean", "full scale", "mean of the gray image", lambda s: frame_means(s.gray)),

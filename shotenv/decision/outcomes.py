@@ -56,6 +56,7 @@ class Outcomes:
 def outcomes_of_all_actions(problem: Problem, drive: Drive) -> Outcomes:
     """Play every action in every frame of `drive` (a batch of one), without its consequences."""
     weights, frames = problem.config.reward, problem.config.frames_per_drive
+    # How warm the laser will be depends on the choices before; whoever plays on the table adds it.
     room_k = torch.full_like(drive.ambient_k, ROOM_K)
 
     steps = torch.arange(frames).unsqueeze(1)

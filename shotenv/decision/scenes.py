@@ -42,6 +42,7 @@ def look_at_scenes(
     bank: Bank, clips: tuple[Clip, ...], kept: KeptPredictions, sensor: SensorConfig
 ) -> Scenes:
     """Scene features of every frame of `clips`."""
+    # NaN, so that a frame of a split that is not played would show at once.
     features = torch.full((len(bank), len(SCENE_FEATURES)), torch.nan)
     log_ambient = torch.full((len(bank), GRID * GRID), torch.nan)
     exposure_s, speed_m_s, yaw_rate_rad_s = map(

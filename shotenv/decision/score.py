@@ -115,6 +115,7 @@ def score_pixels_(
                 counts[1, j] += good
                 counts[2, j] += good & (error_m < near_m)
         all_scored, all_valid, all_near = counts[0].sum(), counts[1].sum(), counts[2].sum()
+        # A frame without scored pixels must not count for or against anyone.
         score[0, b] = sums[0].sum() / all_scored if all_scored else 0.0
         score[1, b] = sums[1].sum() / all_valid if all_valid else range_m
         score[2, b] = np.sqrt(sums[2].sum() / all_valid) if all_valid else range_m

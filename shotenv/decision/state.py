@@ -52,6 +52,7 @@ class Seen:
         self, shots: Tensor, features: Tensor, duty: Tensor, power: Tensor, period_s: float
     ) -> Seen:
         """What is known one frame of `period_s` later, after `shots` [B] with their features."""
+        # Weight of this frame in the averages; a frame longer than the time constant is all of it.
         share = min(1.0, period_s / RECENT_S)
         return Seen(
             features=features,

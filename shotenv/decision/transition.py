@@ -81,20 +81,28 @@ def step(
         `measure_frames`, or a `MeasurementCache`, which gives the same.
     """
     config, period_s = problem.config, problem.frame_period_s
-    drive, laser, seen = state.drive, state.laser, state.seen
+    drive, laser = state.drive, state.laser
 
+    # What is asked for, what the laser can give, and what the frame then brings and costs.
     shots = SHOTS_OF_ACTION.take(actions).masked_fill(laser.tripped, 0)
     power_w = emitted_power_w(drive.laser_power_w, laser.temperature_k, config.laser)
     measured = measure_by_shots(problem, state, shots, power_w, measure)
     cost = cost_of(problem, drive, shots, laser.temperature_k)
     terms = reward_terms(measured.score, cost, drive.always_eight, laser.tripped)
-    paid = reward(terms, config.reward)
 
-    warmer = laser_step(laser, cost, drive.ambient_k, config.laser, period_s)
-    told = seen.after(shots, measured.features, terms["duty"], terms["power"], period_s)
-    following = State(drive, state.step + 1, warmer, told)
-    over = following.step >= config.frames_per_drive
-    return following, Outcome(paid, terms, shots, measured.score, cost, laser.tripped, over)
+    # All that the next frame will know of this one: its heat, and what was seen.
+    warmed = laser_step(laser, cost, drive.ambient_k, config.laser, period_s)
+    seen = state.seen.after(shots, measured.features, terms["duty"], terms["power"], period_s)
+    following = State(drive, state.step + 1, warmed, seen)
+    return following, Outcome(
+        reward=reward(terms, config.reward),
+        terms=terms,
+        shots=shots,
+        score=measured.score,
+        cost=cost,
+        tripped=laser.tripped,
+        truncated=following.step >= config.frames_per_drive,
+    )
 
 
 def cost_of(problem: Problem, drive: Drive, shots: Tensor, temperature_k: Tensor) -> ShotCost:

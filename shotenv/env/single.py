@@ -124,6 +124,7 @@ class ShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
         self.action_space = spaces.Discrete(ACTIONS)
         self.reward_space = reward_space()
         self.state: State | None = None
+        # What `render` paints: the state before the last step, and the shots that it took.
         self._shown: tuple[State, int] | None = None
 
     def reset(

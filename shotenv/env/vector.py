@@ -84,6 +84,7 @@ class ShotScheduleVectorEnv(VectorEnv):
         self.reward_space = reward_space()
         self.state: State | None = None
         self._measure = MeasurementCache() if remember else measure_frames
+        # One for each drive, as single environments with these seeds have.
         self._generators = [seeding.np_random()[0] for _ in range(num_envs)]
         self._over = np.zeros(num_envs, dtype=bool)
         self._shown: dict[int, tuple[State, int]] = {}
@@ -125,7 +126,7 @@ class ShotScheduleVectorEnv(VectorEnv):
             self.autoreset_mode == AutoresetMode.DISABLED and any(self._over)
         ):
             raise gymnasium.error.ResetNeeded("a drive is not under way; call reset() first")
-        # Where a drive was over before: only in NextStep, which spends this step on its reset.
+        # Over since the step before: in NextStep the action is ignored, and a new drive starts.
         resting, rewards = self._over.copy(), np.zeros(self.num_envs)
         infos, rewards[~resting] = self._play(np.flatnonzero(~resting), chosen)
         truncated = self._over & ~resting
@@ -154,6 +155,7 @@ class ShotScheduleVectorEnv(VectorEnv):
         if not len(rows):
             return {}, np.zeros(0)
         index, before = torch.from_numpy(rows), self._under_way()
+        # Picking rows copies maps of whole images; most steps play all drives.
         whole = len(rows) == self.num_envs
         part = before if whole else take(before, index)
         after, outcome = step(self.problem, part, actions[index], measure=self._measure)

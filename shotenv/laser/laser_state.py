@@ -50,6 +50,7 @@ def laser_step(
     For constant power it is that power once several windows have passed; a standard's
     rectangular window has the same steady value.
     """
+    # Case and junction each answer the whole heat flow (see `thermal`); their sum is what trips.
     rise_k = state.junction_rise_k
     case_k = case_step(state.temperature_k - rise_k, cost.heat_j, ambient_k, laser, period_s)
     if laser.junction_resistance_k_per_w:
