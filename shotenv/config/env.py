@@ -38,7 +38,6 @@ class EnvConfig(Section):
         "nearest",
         description="how prediction and wrapped map merge: ours, eq. 6, or the prediction alone",
     )
-    observation: Literal["features"] = Field("features", description="what is observed")
     frames_per_drive: int = Field(256, ge=2, description="frames of one episode")
     frame_rate_hz: Positive = Field(10.0, description="frames per second")
     reward: RewardConfig = RewardConfig()

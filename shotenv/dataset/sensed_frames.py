@@ -24,7 +24,7 @@ from shotenv.sensor import (
     scored_pixels,
     stream_seed,
 )
-from unwrap.depth import move_depth, correct_sensed
+from unwrap.depth import correct_sensed, move_depth
 from unwrap.signal import GRAY_FULL_SCALE, Memory, Sensed, SensorDescription, Shots, Truth
 from unwrap.support import concatenate, mapped
 

@@ -1,7 +1,6 @@
 from .acquire import (
     Acquisition as Acquisition,
     acquire_depth as acquire_depth,
-    measure as measure,
     noise_of as noise_of,
 )
 from .drive import Drive as Drive, draw_drive as draw_drive
@@ -13,10 +12,11 @@ from .features import (
     feature_index as feature_index,
     heat_margin_k as heat_margin_k,
 )
+from .measurement import measure_frames as measure_frames
+from .measurement_cache import MeasurementCache as MeasurementCache
 from .observation import observe as observe
 from .outcomes import Outcomes as Outcomes, outcomes_of_all_actions as outcomes_of_all_actions
 from .problem import Problem as Problem, open_problem as open_problem
-from .recall import Recall as Recall
 from .rewards import TERMS as TERMS, reward as reward
 from .state import State as State
-from .transition import Outcome as Outcome, derated_w as derated_w, reset as reset, step as step
+from .transition import Outcome as Outcome, reset as reset, step as step

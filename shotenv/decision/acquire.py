@@ -1,18 +1,15 @@
-"""One acquisition of the drive's current frames: light -> raw -> depth -> score and features."""
+"""One acquisition of the drives' current frames: light -> raw samples -> depth."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from shotenv.decision.drive import Drive
-from shotenv.decision.features import SEEN_FEATURES, Sums, evaluated
 from shotenv.decision.problem import Problem
-from shotenv.decision.score import DepthScore, score_depth
 from shotenv.sensor import (
     acquire,
     light_of,
@@ -23,10 +20,6 @@ from shotenv.sensor import (
 )
 from unwrap.depth import correct
 from unwrap.signal import GRAY_FULL_SCALE, DepthFrame, RawFrame, Sensed, Shots
-from unwrap.support import array, loop
-
-Array = np.ndarray
-ZERO, ONE_M, FOUR = np.float32(0.0), np.float32(1.0), np.float32(4.0)
 
 
 @dataclass(frozen=True)
@@ -51,22 +44,6 @@ class Acquisition:
     scored: Tensor
 
 
-@dataclass(frozen=True)
-class Measured:
-    """What is known after an acquisition.
-
-    Attributes
-    ----------
-    score : DepthScore
-        Against the truth; pays the reward.
-    seen : float32 [B, len(SEEN_FEATURES)]
-        What the sensor itself can tell; only the features `TOLD` by the shots mean something.
-    """
-
-    score: DepthScore
-    seen: Tensor
-
-
 def noise_of(drive: Drive, step: Tensor, height: int, width: int) -> Iterator[Tensor]:
     """Normals [B, 2, H, W], sample after sample, of the frames at `step` [B].
 
@@ -86,20 +63,25 @@ def acquire_depth(
 ) -> Acquisition:
     """Acquire and correct the frames at `step` [B] of `drive` with `shots` samples each.
 
-    `power_w` [B] is the laser's power while on where it is not the drive's own; `noise` gives the
-    normals [B, 2, H, W] of each sample, and None draws the drive's own.
+    Parameters
+    ----------
+    power_w : float64 [B], optional
+        What the laser emits while on, W; None is the drive's own power, not derated.
+    noise : iterable of float32 [B, 2, H, W], optional
+        Normals of each sample; None draws the drive's own.
     """
     bank, sensor, frames = problem.bank, problem.config.sensor, drive.frame(step)
+    exposure, gray = bank.exposure(frames), bank.gray(frames)
     if noise is None:
         noise = noise_of(drive, step, bank.height, bank.width)
-    exposure = bank.exposure(frames)
-    full = light = light_of(exposure, drive.sensitivity)
-    if power_w is not None:
+    # Which pixels count must not depend on the action, and derating follows from earlier ones.
+    undiminished = light = light_of(exposure, drive.sensitivity)
+    if power_w is not None and drive.is_derated(power_w):
         light = light_of(exposure, sensitivity(sensor, power_w, drive.integration_s))
+    scored = scored_pixels(undiminished, exposure.distance_m, sensor)
     raw = acquire(light, sensor, shots=shots, noise=noise, offsets=drive.offsets)
-    scored = scored_pixels(full, exposure.distance_m, sensor)
     noise_lsb = sample_noise_lsb(
-        bank.gray(frames), problem.gray_exposure_s.take(frames), drive.integration_s, sensor
+        gray, problem.gray_exposure_s.take(frames), drive.integration_s, sensor
     )
     predicted_m = predict(problem, drive, frames, raw, noise_lsb)
     depth = correct(
@@ -107,12 +89,21 @@ def acquire_depth(
         predicted_m,
         problem.description,
         merge=problem.config.merge,
-        # Four samples of a frequency cancel the offset by themselves.
-        offset_lsb=drive.offsets.calibrated_lsb if shots == Shots.TWO else None,
+        offset_lsb=offset_to_subtract_lsb(drive, shots),
         noise_lsb=noise_lsb,
         shift_m=drive.drift_m,
     )
     return Acquisition(raw, depth, predicted_m, noise_lsb, exposure.distance_m, scored)
+
+
+def offset_to_subtract_lsb(drive: Drive, shots: Shots) -> Tensor | None:
+    """The calibrated dark offset [B, H, W] where it is subtracted from samples: with 2 DCS only.
+
+    Four samples of a frequency come in pairs half a period apart, whose differences D0 - D2 and
+    D1 - D3 hold no offset. Two samples have no partner, so the stored map must do, and what it
+    does not know (temperature, ambient light) stays in the phase.
+    """
+    return drive.offsets.calibrated_lsb if shots == Shots.TWO else None
 
 
 def predict(
@@ -120,92 +111,18 @@ def predict(
 ) -> Tensor:
     """The network's distance float32 [B, H, W] of the bank frames `frames` [B].
 
-    Kept where the gray image is all that it looks at; else made of the samples `raw`, which have
-    the noise `noise_lsb` [B, H, W]. Nothing of the frame before is shown to the network.
+    Looked up where the gray image is all that the network takes; else predicted from the samples
+    `raw`, which have the noise `noise_lsb` [B, H, W]. A network that has a memory starts without
+    one in every frame, so that an outcome depends on the drive, the frame and the shots alone.
     """
     if problem.fusion is None:
         return problem.kept.distance_of(frames)
     sensed = Sensed(
         gray=problem.bank.gray(frames).to(torch.float32) / GRAY_FULL_SCALE,
         raw=raw,
+        # Networks are trained with the stored map beside the samples, whatever their number.
         offset_lsb=drive.offsets.calibrated_lsb,
         noise_lsb=noise_lsb,
         shift_m=drive.drift_m,
     )
     return problem.fusion.predict_sensed(sensed, problem.description).distance_m
-
-
-def measure(
-    problem: Problem,
-    drive: Drive,
-    step: Tensor,
-    shots: Shots,
-    power_w: Tensor | None = None,
-    *,
-    noise: Iterable[Tensor] | None = None,
-) -> Measured:
-    """Acquire, correct and score the frames at `step` [B] of `drive`; see `acquire_depth`."""
-    made = acquire_depth(problem, drive, step, shots, power_w, noise=noise)
-    score = score_depth(
-        made.depth.distance_m,
-        made.depth.valid,
-        made.truth_m,
-        made.scored,
-        error_scale_m=problem.config.reward.error_scale_m,
-        unambiguous_m=made.depth.unambiguous_m,
-        range_m=problem.config.sensor.max_range_m,
-    )
-    return Measured(score, evaluated(SEEN_FEATURES, sums_of(made)))
-
-
-def sums_of(made: Acquisition) -> Sums:
-    """What the pixels of an acquisition tell without the truth, summed over each frame."""
-    depth, sums = made.depth, np.empty((6, len(made.depth.distance_m)))
-    _sum_pixels(
-        array(depth.amplitude),
-        # With two samples there is none; what is made of it is then not told.
-        array(depth.amplitude if depth.residual is None else depth.residual),
-        array(made.noise_lsb),
-        array(depth.valid, np.bool_),
-        array(made.raw.saturated, np.bool_),
-        array(depth.distance_m),
-        array(made.predicted_m),
-        sums,
-    )
-    valid, saturated, amplitude_lsb, strength, residual, disagreement = torch.from_numpy(sums)
-    pixels = torch.full_like(valid, depth.valid.shape[1] * depth.valid.shape[2])
-    return Sums(pixels, valid, saturated, amplitude_lsb, strength, residual, disagreement)
-
-
-@loop
-def _sum_pixels(
-    amplitude_lsb: Array,
-    residual_lsb: Array,
-    noise_lsb: Array,
-    valid: Array,
-    saturated: Array,
-    distance_m: Array,
-    predicted_m: Array,
-    found: Array,
-) -> None:
-    """The fields of `Sums` but the pixels, float64 [6, B], of maps [B, H, W].
-
-    Sums go column by column first, as those of scores do.
-    """
-    frames, rows, columns = valid.shape
-    for b in range(frames):
-        sums, counts = np.zeros((4, columns)), np.zeros((2, columns), np.int32)
-        for i in range(rows):
-            for j in range(columns):
-                four_sigma_lsb = FOUR * noise_lsb[b, i, j]
-                amplitude, residual = amplitude_lsb[b, i, j], residual_lsb[b, i, j]
-                apart_m = abs(distance_m[b, i, j] - predicted_m[b, i, j])
-                counts[0, j] += valid[b, i, j]
-                counts[1, j] += saturated[b, i, j]
-                sums[0, j] += amplitude
-                sums[1, j] += amplitude / (amplitude + four_sigma_lsb)
-                sums[2, j] += residual / (residual + four_sigma_lsb)
-                sums[3, j] += apart_m / (apart_m + ONE_M) if valid[b, i, j] else ZERO
-        found[0, b], found[1, b] = counts[0].sum(), counts[1].sum()
-        for k in range(4):
-            found[2 + k, b] = sums[k].sum()

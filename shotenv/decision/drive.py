@@ -68,6 +68,10 @@ class Drive:
         """Bank frames int64 [B] at `step` [B]."""
         return self.frames.gather(1, step.unsqueeze(1)).squeeze(1)
 
+    def is_derated(self, power_w: Tensor) -> bool:
+        """Whether the power [B] that lasers emit is not the drives' own in all of the batch."""
+        return not torch.equal(power_w, self.laser_power_w)
+
 
 def draw_drive(
     seed: int, config: EnvConfig, clips: Sequence[Clip], height: int, width: int
@@ -77,8 +81,10 @@ def draw_drive(
     Laser power and integration time are drawn log-uniformly, the ambient temperature uniformly,
     and the laser starts between ambient and the temperature at which it would be released.
     """
+    # A stream for each purpose: a longer layout does not change the laser that is drawn.
     layout, body = stream(Purpose.DRIVE, seed, 0), stream(Purpose.DRIVE, seed, 1)
-    frames = draw_frames(clips, config.frames_per_drive + 1, generator=layout)
+    # One frame more than are played: the last step, too, is followed by an observation.
+    frames = chain_clips(clips, config.frames_per_drive + 1, generator=layout)
     unit = torch.rand(4, dtype=torch.float64, generator=body)
     laser_power_w = _log_uniform(config.laser.optical_power_w, unit[0:1])
     integration_s = _log_uniform(config.sensor.integration_s, unit[1:2])
@@ -101,6 +107,7 @@ def draw_drive(
         sensitivity=sensitivity(config.sensor, laser_power_w, integration_s),
         offsets=offsets,
         drift_m=residual_drift_m(config.sensor, imager_k),
+        # The most there is: the reward's terms must not leave 0..1 however warm the laser is.
         always_eight=shot_cost(
             torch.tensor([int(Shots.EIGHT)]),
             config.laser,
@@ -113,7 +120,7 @@ def draw_drive(
     )
 
 
-def draw_frames(clips: Sequence[Clip], length: int, *, generator: torch.Generator) -> Tensor:
+def chain_clips(clips: Sequence[Clip], length: int, *, generator: torch.Generator) -> Tensor:
     """Bank frames int64 [length] of randomly chosen clips, each played from start to end.
 
     The next clip is of the same family with probability `FAMILY_STAYS`, else of any; no clip
@@ -122,17 +129,14 @@ def draw_frames(clips: Sequence[Clip], length: int, *, generator: torch.Generato
     frames: list[int] = []
     last: Clip | None = None
     while len(frames) < length:
-        last = _next_clip(clips, last, generator)
+        # Both are always drawn, so that the layout's stream keeps step whatever is chosen.
+        stays, choice = torch.rand(2, dtype=torch.float64, generator=generator).tolist()
+        others = [clip for clip in clips if clip is not last] or list(clips)
+        same_family = [clip for clip in others if last and clip.family == last.family]
+        pool = same_family if same_family and stays < FAMILY_STAYS else others
+        last = pool[int(choice * len(pool))]
         frames.extend(range(last.start, last.start + last.frames))
     return torch.tensor(frames[:length])
-
-
-def _next_clip(clips: Sequence[Clip], last: Clip | None, generator: torch.Generator) -> Clip:
-    stays, choice = torch.rand(2, dtype=torch.float64, generator=generator).tolist()
-    others = [clip for clip in clips if clip is not last] or list(clips)
-    kin = [clip for clip in others if last is not None and clip.family == last.family]
-    pool = kin if kin and stays < FAMILY_STAYS else others
-    return pool[int(choice * len(pool))]
 
 
 def _uniform(bounds: Range, unit: Tensor) -> Tensor:

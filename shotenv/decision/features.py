@@ -166,6 +166,7 @@ def recently(since: Tensor) -> Tensor:
     return 1.0 - torch.exp(since / -16.0)
 
 
+# One line for each, however long: name and formula are read together.
 # fmt: off
 SCENE_FEATURES = (
     Feature("gray_mean", "full scale", "mean of the gray image", lambda s: frame_means(s.gray)),
@@ -212,11 +213,13 @@ STATE_FEATURES = (
 FEATURES = (*SCENE_FEATURES, *SEEN_FEATURES, *STATE_FEATURES)
 """All features, in the order of the observation."""
 FEATURE_NAMES = tuple(feature.name for feature in FEATURES)
-TOLD = {
-    shots: torch.tensor([feature.least_shots <= shots for feature in SEEN_FEATURES])
-    for shots in Shots
-}
-"""Which of the `SEEN_FEATURES` a number of samples tells, bool [S]."""
+TOLD = torch.tensor(
+    [
+        [feature.least_shots <= shots for feature in SEEN_FEATURES]
+        for shots in range(Shots.EIGHT + 1)
+    ]
+)
+"""Which of the `SEEN_FEATURES` each number of samples tells, bool [9, S]; none without any."""
 
 
 def evaluated(features: Sequence[Feature], seen: Scene | Sums | Now) -> Tensor:

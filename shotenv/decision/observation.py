@@ -1,4 +1,4 @@
-"""The observation of a state: what was seen of the frame, what was told before, the state itself."""
+"""The observation: what is seen of the frame, what earlier frames told, the state of the drive."""
 
 from __future__ import annotations
 
@@ -13,27 +13,21 @@ from shotenv.decision.state import State
 @torch.inference_mode()
 def observe(problem: Problem, state: State) -> Tensor:
     """Features float32 [B, len(FEATURES)] in [-LIMIT, LIMIT], in the order of `FEATURES`."""
-    scene = problem.scenes.features[state.drive.frame(state.step)]
-    current = evaluated(STATE_FEATURES, _now(problem, state))
-    return torch.cat((scene, state.seen.features, current), dim=1).clamp_(-LIMIT, LIMIT)
-
-
-def _now(problem: Problem, state: State) -> Now:
-    drive, seen, laser = state.drive, state.seen, problem.config.laser
+    drive, seen, laser, limits = state.drive, state.seen, state.laser, problem.config.laser
+    # The first frame has none before it, and so no change.
     frame, before = drive.frame(state.step), drive.frame((state.step - 1).clamp(min=0))
-    temperature_k = state.laser.temperature_k
-    limit_k = torch.where(state.laser.tripped, laser.release_k, laser.trip_k)
-    since_four, since_eight = seen.since.unbind(1)
-    duty, power = seen.used.unbind(1)
-    return Now(
+    limit_k = torch.where(laser.tripped, limits.release_k, limits.trip_k)
+    now = Now(
         gray_change=problem.scenes.change(before, frame),
         shots=seen.shots,
-        since_four=since_four,
-        since_eight=since_eight,
-        above_release_k=temperature_k - laser.release_k,
-        margin_k=limit_k - temperature_k,
-        duty=duty,
-        power=power,
+        since_four=seen.since_four,
+        since_eight=seen.since_eight,
+        above_release_k=laser.temperature_k - limits.release_k,
+        margin_k=limit_k - laser.temperature_k,
+        duty=seen.duty,
+        power=seen.power,
         step=state.step,
         frames=problem.config.frames_per_drive,
     )
+    parts = problem.scenes.features[frame], seen.features, evaluated(STATE_FEATURES, now)
+    return torch.cat(parts, dim=1).clamp_(-LIMIT, LIMIT)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -11,21 +9,18 @@ import torch
 from torch import Tensor
 
 from shotenv.config import ROOM_K
-from shotenv.decision.acquire import Measured, measure, noise_of
+from shotenv.decision.acquire import noise_of
 from shotenv.decision.drive import Drive
-from shotenv.decision.features import (
-    SEEN_FEATURES,
-)
+from shotenv.decision.features import TOLD
+from shotenv.decision.measurement import Measurement, measure_frames
 from shotenv.decision.problem import Problem
 from shotenv.decision.rewards import reward, reward_terms
 from shotenv.decision.score import DepthScore, no_depth
-from shotenv.decision.transition import (
-    SHOTS_OF_ACTION,
-    cost_of,
-    keep_untold,
-)
+from shotenv.decision.transition import SHOTS_OF_ACTION, cost_of
 from unwrap.signal import Shots
-from unwrap.support import concatenate
+from unwrap.support import concatenate, mapped
+
+ACTIONS = len(SHOTS_OF_ACTION)
 
 
 @dataclass(frozen=True)
@@ -40,10 +35,12 @@ class Outcomes:
     heat_j : float64 [T, 3]
     score : DepthScore
         Fields [T, 3].
-    features : float32 [T, 3, 6]
+    features : float32 [T, 3, len(SEEN_FEATURES)]
         What the sensor would tell; 0 where the shots cannot.
-    tripped_terms : dict of float64
+    tripped_terms : dict of float64 [1]
         Terms of a frame without laser, the same in every frame.
+    tripped_reward : float
+        Reward of a frame without laser.
     """
 
     terms: dict[str, Tensor]
@@ -58,45 +55,38 @@ class Outcomes:
 @torch.inference_mode()
 def outcomes_of_all_actions(problem: Problem, drive: Drive) -> Outcomes:
     """Play every action in every frame of `drive` (a batch of one), without its consequences."""
-    steps = torch.arange(problem.config.frames_per_drive)
-    measured = [_measure_all(problem, drive, step.unsqueeze(0)) for step in steps]
-    score = _stack([m.score for m in measured], len(steps))
-    features = torch.cat([m.seen for m in measured]).unflatten(0, (len(steps), 3))
+    weights, frames = problem.config.reward, problem.config.frames_per_drive
+    # How warm the laser will be depends on the choices before; whoever plays on the table adds it.
     room_k = torch.full_like(drive.ambient_k, ROOM_K)
+
+    steps = torch.arange(frames).unsqueeze(1)
+    measured = concatenate([_measure_all(problem, drive, step) for step in steps])
+    measured = mapped(lambda rows: rows.unflatten(0, (frames, ACTIONS)), measured)
     cost = cost_of(problem, drive, SHOTS_OF_ACTION, room_k)
-    working = torch.zeros(len(steps), 3, dtype=torch.bool)
-    terms = reward_terms(score, cost, drive.always_eight, working)
+    working = torch.zeros(frames, ACTIONS, dtype=torch.bool)
+    terms = reward_terms(measured.score, cost, drive.always_eight, working)
+    # What an action costs is the same in every frame.
+    terms = {name: term.expand(frames, ACTIONS) for name, term in terms.items()}
+
     off = cost_of(problem, drive, torch.zeros(1, dtype=torch.int64), room_k)
     lost = no_depth(1, problem.config.sensor.max_range_m)
     tripped_terms = reward_terms(lost, off, drive.always_eight, torch.ones(1, dtype=torch.bool))
-    everywhere = {name: value.expand(len(steps), 3) for name, value in terms.items()}
     return Outcomes(
-        terms=everywhere,
-        reward=reward(everywhere, problem.config.reward),
-        heat_j=cost.heat_j.expand(len(steps), 3),
-        score=score,
-        features=features,
+        terms=terms,
+        reward=reward(terms, weights),
+        heat_j=cost.heat_j.expand(frames, ACTIONS),
+        score=measured.score,
+        features=torch.where(TOLD[SHOTS_OF_ACTION], measured.features, 0.0),
         tripped_terms=tripped_terms,
-        tripped_reward=float(reward(tripped_terms, problem.config.reward)),
+        tripped_reward=float(reward(tripped_terms, weights)),
     )
 
 
-def _measure_all(problem: Problem, drive: Drive, step: Tensor) -> Measured:
-    """All three acquisitions of one frame; they share the noise of the longest."""
-    noise = list(
-        islice(noise_of(drive, step, problem.bank.height, problem.bank.width), Shots.EIGHT)
-    )
-    measured = [measure(problem, drive, step, shots, noise=noise) for shots in Shots]
-    untold = torch.zeros(1, len(SEEN_FEATURES))
-    return concatenate(
-        [
-            Measured(one.score, keep_untold(shots, one.seen, untold))
-            for shots, one in zip(Shots, measured, strict=True)
-        ]
-    )
+def _measure_all(problem: Problem, drive: Drive, step: Tensor) -> Measurement:
+    """All three acquisitions of the frame at `step` [1], a batch of three.
 
-
-def _stack(scores: Sequence[DepthScore], frames: int) -> DepthScore:
-    joined = concatenate(scores)
-    fields = [field.name for field in dataclasses.fields(joined)]
-    return DepthScore(*(getattr(joined, name).unflatten(0, (frames, 3)) for name in fields))
+    They share the noise of the longest, as the frames of fewer samples are prefixes of it.
+    """
+    normals = noise_of(drive, step, problem.bank.height, problem.bank.width)
+    noise = list(islice(normals, Shots.EIGHT))
+    return concatenate([measure_frames(problem, drive, step, n, noise=noise) for n in Shots])

@@ -18,6 +18,11 @@ from unwrap.signal import SensorDescription
 GRAY_NETWORK = "tofregnet"
 """What is seen of a frame before any sample is taken comes from this network where the chosen one
 needs samples."""
+PROBLEMS_OPEN = 4
+"""Problems that `open_problem` keeps for the process, those used last: a study's, which are all,
+training, validation and test drives. Each holds its networks, 80 numbers per bank frame
+(`Scenes` and exposures), and maps of files (bank and kept predictions), which the system reads as
+they are used and drops when memory is short."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +70,11 @@ class Problem:
         return 1.0 / self.config.frame_rate_hz
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=PROBLEMS_OPEN)
 def open_problem(config: EnvConfig) -> Problem:
     """Open bank and network of `config`; environments of one process share the result.
+
+    The last `PROBLEMS_OPEN` stay open.
 
     Raises
     ------
@@ -75,7 +82,7 @@ def open_problem(config: EnvConfig) -> Problem:
         The bank or the network is missing or damaged, the bank was rendered for a sensor with
         other frequencies or timing, or a network that needs samples was trained for another one.
     """
-    # Networks first: a bank may take minutes to render.
+    # Networks first: where one is missing, nobody should wait minutes for a bank to be rendered.
     description = describe(config.sensor)
     gray, fusion = load_networks(config.unwrapper, description)
     bank = open_bank(config.bank)

@@ -1,4 +1,4 @@
-"""Scores of a depth frame and the reward: named bounded terms times weights."""
+"""The reward: named bounded terms times weights."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import torch
 from torch import Tensor
 
 from shotenv.config import RewardConfig
-from shotenv.decision.score import (
-    DepthScore,
-)
+from shotenv.decision.score import DepthScore
 from shotenv.laser import ShotCost
 
 TERMS = ("error", "duty", "power", "tripped")
@@ -30,20 +28,10 @@ def reward_terms(
     }
 
 
-def weights(config: RewardConfig) -> dict[str, float]:
-    """Weight of each term."""
-    return {
-        "error": config.error,
-        "duty": config.duty,
-        "power": config.power,
-        "tripped": config.trip,
-    }
-
-
 def reward(terms: dict[str, Tensor], config: RewardConfig) -> Tensor:
     """Minus the weighted sum of the terms, float64 [B]."""
-    weight_of = weights(config)
-    total = terms["error"] * -weight_of.pop("error")
-    for name, weight in weight_of.items():
+    total = terms["error"] * -config.error
+    # Always in this order: the last bit of a sum depends on it.
+    for name, weight in (("duty", config.duty), ("power", config.power), ("tripped", config.trip)):
         total.sub_(terms[name], alpha=weight)
     return total

@@ -42,31 +42,32 @@ def look_at_scenes(
     bank: Bank, clips: tuple[Clip, ...], kept: KeptPredictions, sensor: SensorConfig
 ) -> Scenes:
     """Scene features of every frame of `clips`."""
+    # NaN, so that a frame of a split that is not played would show at once.
     features = torch.full((len(bank), len(SCENE_FEATURES)), torch.nan)
     log_ambient = torch.full((len(bank), GRID * GRID), torch.nan)
+    exposure_s, speed_m_s, yaw_rate_rad_s = map(
+        torch.from_numpy, (bank.gray_exposure_s, bank.ego_speed_m_s, bank.yaw_rate_rad_s)
+    )
+    # Clip by clip: all frames of a bank at once would fill the memory.
     for clip in clips:
         frames = torch.arange(clip.start, clip.start + clip.frames)
-        scene = _scene(bank, frames, kept, sensor)
+        gray = bank.gray(frames).to(torch.float32) / full_scale_lsb(sensor.adc_bits)
+        prediction = kept.of(frames)
+        scene = Scene(
+            gray=gray,
+            log_ambient=log_ambient_of(gray, exposure_s[frames], sensor),
+            predicted_m=prediction.distance_m,
+            confidence=prediction.confidence,
+            unambiguous_m=unambiguous_range_m(sensor.f1_hz),
+            range_m=sensor.max_range_m,
+            ego_speed_m_s=speed_m_s[frames],
+            yaw_rate_rad_s=yaw_rate_rad_s[frames],
+        )
         features[frames], log_ambient[frames] = evaluated(SCENE_FEATURES, scene), scene.log_ambient
     return Scenes(features, log_ambient)
 
 
-def _scene(bank: Bank, frames: Tensor, kept: KeptPredictions, sensor: SensorConfig) -> Scene:
-    gray = bank.gray(frames).to(torch.float32) / full_scale_lsb(sensor.adc_bits)
-    prediction = kept.of(frames)
-    return Scene(
-        gray=gray,
-        log_ambient=log_ambient(gray, torch.from_numpy(bank.gray_exposure_s)[frames], sensor),
-        predicted_m=prediction.distance_m,
-        confidence=prediction.confidence,
-        unambiguous_m=unambiguous_range_m(sensor.f1_hz),
-        range_m=sensor.max_range_m,
-        ego_speed_m_s=torch.from_numpy(bank.ego_speed_m_s)[frames],
-        yaw_rate_rad_s=torch.from_numpy(bank.yaw_rate_rad_s)[frames],
-    )
-
-
-def log_ambient(gray: Tensor, exposure_s: Tensor, sensor: SensorConfig) -> Tensor:
+def log_ambient_of(gray: Tensor, exposure_s: Tensor, sensor: SensorConfig) -> Tensor:
     """Log10 of the ambient radiance on a coarse grid, [B, GRID * GRID], W m-2 sr-1."""
     full_scale_e = full_scale_lsb(sensor.adc_bits) / gray_gain_lsb_per_e(sensor)
     scale = full_scale_e / (electrons_per_radiance_second(sensor) * exposure_s)

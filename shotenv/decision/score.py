@@ -1,4 +1,4 @@
-"""TODO."""
+"""How good a depth frame is: error and shares over its scored pixels."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ class DepthScore:
     valid_share: Tensor
 
 
-FARTHEST_ERROR_M, ZERO = np.float32(1e9), np.float32(0.0)
+ZERO = np.float32(0.0)
+FARTHEST_ERROR_M = np.float32(1e9)
 """Stands for the error where there is no distance: its term is 1 within the rounding of a float."""
 
 
@@ -67,7 +68,7 @@ def score_depth(
         shapes = [tuple(maps.shape) for maps in (distance_m, valid, truth_m, scored)]
         raise ValueError(f"distance_m, valid, truth_m and scored are {shapes}; expected one shape")
     score = np.empty((5, len(distance_m)))
-    _score(
+    score_pixels_(
         array(distance_m),
         array(valid, np.bool_),
         array(truth_m),
@@ -81,7 +82,7 @@ def score_depth(
 
 
 @loop
-def _score(
+def score_pixels_(
     distance_m: Array,
     valid: Array,
     truth_m: Array,
@@ -91,7 +92,7 @@ def _score(
     range_m: float,
     score: Array,
 ) -> None:
-    """The fields of a score, float64 [5, B], of maps [B, H, W].
+    """Write the fields of a `DepthScore` into `score`, float64 [5, B], of maps [B, H, W].
 
     Sums go column by column first: neighbours are summed side by side, in an order that does not
     depend on the processor.
@@ -102,6 +103,7 @@ def _score(
         for i in range(rows):
             for j in range(columns):
                 error_m = abs(distance_m[b, i, j] - truth_m[b, i, j])
+                # `not <` and not `>=`: NaN is neither.
                 if not error_m < FARTHEST_ERROR_M:
                     error_m = FARTHEST_ERROR_M
                 counted = scored[b, i, j]
@@ -113,6 +115,7 @@ def _score(
                 counts[1, j] += good
                 counts[2, j] += good & (error_m < near_m)
         all_scored, all_valid, all_near = counts[0].sum(), counts[1].sum(), counts[2].sum()
+        # A frame without scored pixels must not count for or against anyone.
         score[0, b] = sums[0].sum() / all_scored if all_scored else 0.0
         score[1, b] = sums[1].sum() / all_valid if all_valid else range_m
         score[2, b] = np.sqrt(sums[2].sum() / all_valid) if all_valid else range_m

@@ -33,7 +33,7 @@ def step_infos(
 
     `cost` is the constraint violation: 1 in a frame without laser, or after which the light
     averaged for eye safety exceeds its cap. `vector_reward` holds the unweighted `reward_terms` in
-    the order of `reward.TERMS`.
+    the order of `TERMS`.
     """
     cost, score, laser = outcome.cost, outcome.score, problem.config.laser
     violated = outcome.tripped | too_bright(after.laser, laser)

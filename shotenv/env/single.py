@@ -22,9 +22,10 @@ from shotenv.decision import (
     step,
 )
 from shotenv.env.info import reset_infos, step_infos
-from shotenv.env.picture import draw_frame
+from shotenv.env.picture import paint_frame
 
 RENDER_MODES = ("rgb_array",)
+OBSERVATIONS = ("features",)
 ACTIONS = 3
 
 
@@ -59,6 +60,18 @@ def check_render_mode(render_mode: str | None) -> str | None:
     return render_mode
 
 
+def check_observation(observation: str) -> None:
+    """Refuse a kind of observation that there is not.
+
+    Raises
+    ------
+    ValueError
+        It is not one of `OBSERVATIONS`.
+    """
+    if observation not in OBSERVATIONS:
+        raise ValueError(f"observation is {observation!r}; expected one of {OBSERVATIONS}")
+
+
 def drive_seed(generator: np.random.Generator) -> int:
     """Seed of the next drive."""
     return int(generator.integers(2**62))
@@ -71,6 +84,8 @@ class ShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
     ----------
     config
         Name in `configs/env/`, or path, of the configuration that `fields` change.
+    observation
+        "features", the only kind.
     render_mode
         None or "rgb_array".
     **fields
@@ -80,7 +95,7 @@ class ShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
     Attributes
     ----------
     feature_names : tuple of str
-        Name of each element of the observation; `shotenv.decision.features.FEATURES` explains them.
+        Name of each element of the observation; `shotenv.decision.FEATURES` explains them.
     reward_space : Box
         Of `info["vector_reward"]`.
 
@@ -94,8 +109,14 @@ class ShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
     metadata = {"render_modes": list(RENDER_MODES), "render_fps": 10}  # noqa: RUF012
 
     def __init__(
-        self, config: str = "default", *, render_mode: str | None = None, **fields: Any
+        self,
+        config: str = "default",
+        *,
+        observation: str = "features",
+        render_mode: str | None = None,
+        **fields: Any,
     ) -> None:
+        check_observation(observation)
         self.render_mode = check_render_mode(render_mode)
         self.problem = open_problem(env_config(config, **fields))
         self.feature_names = FEATURE_NAMES
@@ -103,6 +124,7 @@ class ShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
         self.action_space = spaces.Discrete(ACTIONS)
         self.reward_space = reward_space()
         self.state: State | None = None
+        # What `render` paints: the state before the last step, and the shots that it took.
         self._shown: tuple[State, int] | None = None
 
     def reset(
@@ -140,7 +162,7 @@ class ShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
             return None
         if self._shown is None:
             raise gymnasium.error.ResetNeeded("no drive is under way; call reset() first")
-        return draw_frame(self.problem, *self._shown)
+        return paint_frame(self.problem, *self._shown)
 
     def _observed(self, state: State) -> np.ndarray:
         return observe(self.problem, state)[0].numpy()

@@ -16,19 +16,20 @@ from gymnasium.vector.utils import batch_space
 from shotenv.config import env_config
 from shotenv.decision import (
     FEATURE_NAMES,
-    Recall,
+    MeasurementCache,
     State,
-    measure,
+    measure_frames,
     observe,
     open_problem,
     reset,
     step,
 )
 from shotenv.env.info import reset_infos, step_infos
-from shotenv.env.picture import draw_frame
+from shotenv.env.picture import paint_frame
 from shotenv.env.single import (
     ACTIONS,
     RENDER_MODES,
+    check_observation,
     check_render_mode,
     drive_seed,
     feature_space,
@@ -45,12 +46,13 @@ class ShotScheduleVectorEnv(VectorEnv):
     ----------
     num_envs
         Drives in the batch.
-    config, render_mode, **fields
+    config, observation, render_mode, **fields
         As for `ShotScheduleEnv`.
     autoreset_mode
         "NextStep", "SameStep" or "Disabled", or gymnasium's enum.
     remember
-        Keep what was measured: the same numbers, faster where drives come again.
+        Keep what was measured (`MeasurementCache`): the same numbers, faster where drives come
+        again.
     """
 
     def __init__(
@@ -58,11 +60,13 @@ class ShotScheduleVectorEnv(VectorEnv):
         num_envs: int = 1,
         config: str = "default",
         *,
+        observation: str = "features",
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
         remember: bool = False,
         **fields: Any,
     ) -> None:
+        check_observation(observation)
         self.num_envs = _check_count(num_envs)
         self.autoreset_mode = _check_mode(autoreset_mode)
         self.metadata = {
@@ -79,7 +83,8 @@ class ShotScheduleVectorEnv(VectorEnv):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.reward_space = reward_space()
         self.state: State | None = None
-        self._look = Recall() if remember else measure
+        self._measure = MeasurementCache() if remember else measure_frames
+        # One for each drive, as single environments with these seeds have.
         self._generators = [seeding.np_random()[0] for _ in range(num_envs)]
         self._over = np.zeros(num_envs, dtype=bool)
         self._shown: dict[int, tuple[State, int]] = {}
@@ -101,8 +106,8 @@ class ShotScheduleVectorEnv(VectorEnv):
         for row, value in enumerate(self._check_seeds(seed)):
             if value is not None and row in rows:
                 self._generators[row] = seeding.np_random(value)[0]
-        told = self._restart(rows)
-        return self._observations(), self._batched(told)
+        infos = self._restart(rows)
+        return self._observations(), self._batched(infos)
 
     def step(
         self, actions: np.ndarray
@@ -121,18 +126,19 @@ class ShotScheduleVectorEnv(VectorEnv):
             self.autoreset_mode == AutoresetMode.DISABLED and any(self._over)
         ):
             raise gymnasium.error.ResetNeeded("a drive is not under way; call reset() first")
+        # Over since the step before: in NextStep the action is ignored, and a new drive starts.
         resting, rewards = self._over.copy(), np.zeros(self.num_envs)
-        told, rewards[~resting] = self._play(np.flatnonzero(~resting), chosen)
+        infos, rewards[~resting] = self._play(np.flatnonzero(~resting), chosen)
         truncated = self._over & ~resting
         restarted = resting
         if self.autoreset_mode == AutoresetMode.SAME_STEP:
             restarted, last = truncated, self._observations()
             for row in np.flatnonzero(truncated).tolist():
-                told[row] = {"final_obs": last[row], "final_info": told[row]}
+                infos[row] = {"final_obs": last[row], "final_info": infos[row]}
         for row, info in self._restart(np.flatnonzero(restarted)).items():
-            told[row] = told.get(row, {}) | info
+            infos[row] = infos.get(row, {}) | info
         none = np.zeros(self.num_envs, dtype=bool)
-        return self._observations(), rewards, none, truncated, self._batched(told)
+        return self._observations(), rewards, none, truncated, self._batched(infos)
 
     def error_of(self, shots: Shots) -> np.ndarray:
         """Error term [N] that `shots` would bring in the current frames; nothing is played.
@@ -140,7 +146,7 @@ class ShotScheduleVectorEnv(VectorEnv):
         It does not depend on what is played, so it can serve as a control variate in training.
         """
         state = self._under_way()
-        return self._look(self.problem, state.drive, state.step, shots).score.error.numpy()
+        return self._measure(self.problem, state.drive, state.step, shots).score.error.numpy()
 
     def _play(
         self, rows: np.ndarray, actions: torch.Tensor
@@ -149,9 +155,10 @@ class ShotScheduleVectorEnv(VectorEnv):
         if not len(rows):
             return {}, np.zeros(0)
         index, before = torch.from_numpy(rows), self._under_way()
+        # Picking rows copies maps of whole images; most steps play all drives.
         whole = len(rows) == self.num_envs
         part = before if whole else take(before, index)
-        after, outcome = step(self.problem, part, actions[index], look=self._look)
+        after, outcome = step(self.problem, part, actions[index], measure=self._measure)
         self.state = after if whole else put(before, index, after)
         self._over[rows] = outcome.truncated.numpy()
         self._show(rows, part, outcome.shots.tolist())
@@ -176,17 +183,18 @@ class ShotScheduleVectorEnv(VectorEnv):
             for place, row in enumerate(rows.tolist()):
                 self._shown[row] = take(part, torch.tensor([place])), shots[place]
 
-    def _batched(self, told: dict[int, dict[str, Any]]) -> dict[str, Any]:
-        infos: dict[str, Any] = {}
-        for row in sorted(told):
-            infos = self._add_info(infos, told[row], row)
-        return infos
+    def _batched(self, infos: dict[int, dict[str, Any]]) -> dict[str, Any]:
+        """Infos by row as gymnasium has them: one array for each key, and which rows it is of."""
+        batch: dict[str, Any] = {}
+        for row in sorted(infos):
+            batch = self._add_info(batch, infos[row], row)
+        return batch
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Pictures of the last frames; None without a render mode."""
         if self.render_mode is None:
             return None
-        return tuple(draw_frame(self.problem, *self._shown[row]) for row in range(self.num_envs))
+        return tuple(paint_frame(self.problem, *self._shown[row]) for row in range(self.num_envs))
 
     def _under_way(self) -> State:
         if self.state is None:

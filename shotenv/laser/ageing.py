@@ -31,6 +31,7 @@ def ageing_rate(electrical_power_w: Array, temperature_k: Array, laser: LaserCon
 def _current(electrical_power_w: Array, laser: LaserConfig) -> Array:
     if not laser.ageing_exponent:
         return 1.0
+    # What the rated current takes: the light's power at 25 C over the efficiency there.
     rated_w = laser.rated_power_w / laser.efficiency
     return (electrical_power_w / rated_w) ** laser.ageing_exponent
 

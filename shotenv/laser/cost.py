@@ -1,4 +1,4 @@
-"""TODO."""
+"""What the acquisition of a frame costs: energy by part, light, heat, duty and wear."""
 
 from __future__ import annotations
 

@@ -14,8 +14,9 @@ from shotenv.laser.cost import ShotCost
 
 Array = Any
 SECONDS_PER_HOUR = 3600.0
-NETWORK_RUNS = (0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
-"""Predictions by number of samples: two and four do not unwrap by themselves."""
+MOST_SHOTS = 8
+UNWRAPPED_BY_NETWORK = (2, 4)
+"""Numbers of samples that do not unwrap by themselves, and so take a prediction."""
 
 
 def emitted_power_w(power_w: Array, temperature_k: Array, laser: LaserConfig) -> Array:
@@ -45,12 +46,16 @@ def efficiency_at(temperature_k: Array, laser: LaserConfig) -> Array:
 def chip_energies_j(readout_j: float, static_j: float, network_j: float) -> Tensor:
     """What does not depend on the laser, by number of samples, float64 [4, 9], joules.
 
-    Of the readouts, of the imager standing by, of the network, and of all three.
+    Of the readouts, of the imager standing by, of the network, and of all three. As a table,
+    because a step looks up its row faster than it could work it out.
     """
-    rows = [
-        ((n + 1) * readout_j, static_j, runs * network_j) for n, runs in enumerate(NETWORK_RUNS)
-    ]
-    return torch.tensor([(*row, sum(row)) for row in rows], dtype=torch.float64).T.contiguous()
+    rows = []
+    for shots in range(MOST_SHOTS + 1):
+        # One readout more, of the gray image.
+        readouts_j = (shots + 1) * readout_j
+        prediction_j = network_j if shots in UNWRAPPED_BY_NETWORK else 0.0
+        rows.append((readouts_j, static_j, prediction_j, readouts_j + static_j + prediction_j))
+    return torch.tensor(rows, dtype=torch.float64).T.contiguous()
 
 
 def shot_cost(
@@ -66,8 +71,8 @@ def shot_cost(
     """Energy, duty, heat and wear of one frame.
 
     Laser, modulation driver and readouts go with the samples, one readout more with the gray
-    image; the imager's static power with the frame period; the network is run where the shots do
-    not unwrap by themselves, with 2 and 4 samples.
+    image; the imager's static power with the frame period; a prediction of the network with
+    `UNWRAPPED_BY_NETWORK` samples.
 
     Parameters
     ----------

@@ -70,6 +70,24 @@ def test_observations_and_infos_share_no_memory(env):
     assert info1["reward_terms"] is not info2["reward_terms"]
 
 
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+@pytest.mark.parametrize("name", IDS)
+def test_observations_of_a_vector_share_no_memory(name, mode, tiny_kwargs):
+    """Whatever an agent writes into an observation, no later one shows it."""
+    kwargs = {**tiny_kwargs, "frames_per_drive": 4}
+    plain, scribbled = (gymnasium.make_vec(name, 3, autoreset_mode=mode, **kwargs) for _ in "12")
+    expected, observation = plain.reset(seed=8)[0], scribbled.reset(seed=8)[0]
+    kept, copies = [expected], [expected.copy()]
+    for action in (2, 0, 1, 1, 0, 2):
+        observation[:] = np.nan
+        expected, observation = (envs.step(np.full(3, action))[0] for envs in (plain, scribbled))
+        assert np.array_equal(expected, observation)
+        kept.append(expected)
+        copies.append(expected.copy())
+    # Nor does a step write into an observation that was given out before.
+    assert all(np.array_equal(one, copy) for one, copy in zip(kept, copies, strict=True))
+
+
 def test_the_start_is_random_and_seeded(env):
     starts = [env.reset(seed=seed)[0] for seed in (0, 1, 2, 0)]
     assert np.array_equal(starts[0], starts[3])
@@ -82,6 +100,22 @@ def test_spec_survives_json(env):
     assert spec.kwargs == json.loads(json.dumps(env.spec.kwargs))
     again = gymnasium.make(spec)
     assert np.array_equal(again.reset(seed=5)[0], env.reset(seed=5)[0])
+
+
+def test_the_kind_of_observation_may_be_named(env):
+    named = gymnasium.make(EnvSpec.from_json(env.spec.to_json()), observation="features")
+    assert np.array_equal(named.reset(seed=5)[0], env.reset(seed=5)[0])
+
+
+@pytest.mark.parametrize("remember", [False, True])
+@pytest.mark.parametrize("name", IDS)
+def test_a_pickled_vector_goes_on_where_it_stopped(name, remember, tiny_kwargs):
+    envs = gymnasium.make_vec(name, 2, remember=remember, **{**tiny_kwargs, "frames_per_drive": 4})
+    envs.reset(seed=4)
+    envs.step(np.array([1, 2]))
+    twin = pickle.loads(pickle.dumps(envs))
+    for action in (2, 0, 1, 1, 2):
+        assert data_equivalence(envs.step(np.full(2, action)), twin.step(np.full(2, action)))
 
 
 def test_a_pickled_environment_goes_on_where_it_stopped(env):

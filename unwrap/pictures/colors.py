@@ -15,12 +15,16 @@ NO_VALUE_RGB = (214, 217, 222)
 
 @dataclass(frozen=True)
 class ColorMap:
-    """How a quantity is coloured: from `low` to `high` in `unit`, through `anchors` (#rrggbb)."""
+    """How a quantity is coloured: from `low` to `high` in `unit`, through `anchors` (#rrggbb).
+
+    What is not finite is drawn in `no_value` (red, green, blue).
+    """
 
     low: float
     high: float
     unit: str
     anchors: tuple[str, ...]
+    no_value: tuple[int, int, int] = NO_VALUE_RGB
 
     @property
     def palette(self) -> np.ndarray:
@@ -29,7 +33,7 @@ class ColorMap:
         channels = np.array([_rgb(anchor) for anchor in self.anchors]).T
         position = np.linspace(0.0, 1.0, LEVELS)
         colors = np.stack([np.interp(position, stops, channel) for channel in channels], axis=-1)
-        return np.vstack([colors.round(), [NO_VALUE_RGB]]).astype(np.uint8)
+        return np.vstack([colors.round(), [self.no_value]]).astype(np.uint8)
 
     @property
     def css(self) -> str:
@@ -55,7 +59,7 @@ GRAY = ("#000000", "#ffffff")
 
 
 def paint(values: np.ndarray, colors: ColorMap) -> Image.Image:
-    """Palette image of `values` [H, W]; what is not finite is drawn in the no-value gray."""
+    """Palette image of `values` [H, W]; what is not finite in the no-value colour."""
     scaled = (values - colors.low) / (colors.high - colors.low) * (LEVELS - 1)
     known = np.isfinite(scaled)
     index = np.where(known, np.clip(np.where(known, scaled, 0.0), 0, LEVELS - 1).round(), LEVELS)

@@ -11,7 +11,7 @@ import torch
 from shotenv.bank.predictions import keep_predictions
 from shotenv.config.env import RewardConfig
 from shotenv.config.keywords import env_config
-from shotenv.decision.drive import draw_frames
+from shotenv.decision.drive import chain_clips
 from shotenv.decision.features import FEATURE_NAMES, LIMIT, frame_means
 from shotenv.decision.observation import observe
 from shotenv.decision.outcomes import outcomes_of_all_actions
@@ -136,7 +136,7 @@ def test_rows_of_nested_values():
 
 def test_a_drive_plays_whole_clips_of_its_split(problem):
     clips = problem.bank.splits("train")
-    frames = draw_frames(clips, 101, generator=torch.Generator().manual_seed(0)).tolist()
+    frames = chain_clips(clips, 101, generator=torch.Generator().manual_seed(0)).tolist()
     assert len(frames) == 101
     order = []
     for start in range(0, 100, 4):

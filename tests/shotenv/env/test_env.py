@@ -161,7 +161,7 @@ def test_the_native_vector_behaves_like_gymnasiums_own(tiny_kwargs, mode):
     theirs = sync(tiny_kwargs, AutoresetMode(mode), frames_per_drive=4)
     assert ours.metadata["autoreset_mode"] is AutoresetMode(mode)
     assert data_equivalence(ours.reset(seed=7), theirs.reset(seed=7))
-    random = np.random.default_rng(1)
+    random, keys = np.random.default_rng(1), set()
     for _ in range(11):
         actions = random.integers(0, 3, 3)
         left, right = ours.step(actions), theirs.step(actions)
@@ -175,6 +175,10 @@ def test_the_native_vector_behaves_like_gymnasiums_own(tiny_kwargs, mode):
             for a, b in zip(left[4]["final_obs"], right[4]["final_obs"], strict=True):
                 assert np.array_equal(a, b)
             assert set(left[4]["final_info"]) == set(right[4]["final_info"])
+        keys |= set(left[4])
+    # Both a step's infos and a new drive's were among what was compared.
+    assert keys >= {"shots", "_shots", "temperature_k", "vector_reward", "drive_seed"}
+    assert ("final_obs" in keys) == (mode == "SameStep")
 
 
 def test_disabled_autoreset_waits_for_the_mask(tiny_kwargs):
@@ -202,6 +206,8 @@ def test_wrong_vector_arguments_are_named(tiny_kwargs):
         make_vec(tiny_kwargs, autoreset_mode="Sometimes")
     with pytest.raises(ValueError, match="num_envs"):
         make_vec(tiny_kwargs, num_envs=0)
+    with pytest.raises(ValueError, match="observation is 'image'; expected"):
+        make_vec(tiny_kwargs, observation="image")
     with pytest.raises(ValueError, match="seed has 2 values"):
         make_vec(tiny_kwargs).reset(seed=[1, 2])
 

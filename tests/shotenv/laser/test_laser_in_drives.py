@@ -15,13 +15,15 @@ from agents.optimum.outcome_table import play
 from agents.optimum.tabulation import tabulate
 from agents.policies.fixed import FixedPolicy, RandomPolicy
 from shotenv.config.keywords import env_config
-from shotenv.decision.acquire import acquire_depth, measure
+from shotenv.decision.acquire import acquire_depth
+from shotenv.decision.measurement import measure_frames
 from shotenv.decision.outcomes import outcomes_of_all_actions
 from shotenv.decision.problem import open_problem
-from shotenv.decision.transition import derated_w, reset, step
+from shotenv.decision.transition import reset, step
 from shotenv.env.single import ShotScheduleEnv
 from shotenv.env.vector import ShotScheduleVectorEnv
 from shotenv.laser.cost import ENERGY_PARTS
+from shotenv.laser.energy import emitted_power_w
 from unwrap.signal.shots import Shots
 
 SEEDS = [1000, 1001, 1002]
@@ -79,13 +81,15 @@ def test_cost_tells_of_a_trip_and_of_too_much_light(hot):
 
 def test_a_derated_frame_is_measured_with_the_power_that_is_left(problem):
     state = warmed(problem, reset(problem, [5, 6]), 334.15)
-    power_w = derated_w(problem, state)
+    power_w = emitted_power_w(
+        state.drive.laser_power_w, state.laser.temperature_k, problem.config.laser
+    )
     torch.testing.assert_close(power_w, state.drive.laser_power_w * (1 - 0.03 * 6.0))
     _, outcome = step(problem, state, torch.tensor([1, 1]))
-    derated = measure(problem, state.drive, state.step, Shots.FOUR, power_w)
-    full = measure(problem, state.drive, state.step, Shots.FOUR)
+    derated = measure_frames(problem, state.drive, state.step, Shots.FOUR, power_w)
+    full = measure_frames(problem, state.drive, state.step, Shots.FOUR)
     assert torch.equal(outcome.score.error, derated.score.error)
-    assert (derated.seen[:, 0] < full.seen[:, 0]).all()
+    assert (derated.features[:, 0] < full.features[:, 0]).all()
     torch.testing.assert_close(outcome.cost.optical_j, 4 * state.drive.integration_s * power_w)
 
 
@@ -104,7 +108,7 @@ def test_derating_does_not_excuse_pixels(problem):
 def test_a_cool_laser_is_not_derated(problem):
     state = warmed(problem, reset(problem, [5]), 320.0)
     _, outcome = step(problem, state, torch.tensor([2]))
-    full = measure(problem, state.drive, state.step, Shots.EIGHT)
+    full = measure_frames(problem, state.drive, state.step, Shots.EIGHT)
     assert torch.equal(outcome.score.error, full.score.error)
     table = outcomes_of_all_actions(problem, state.drive)
     assert table.terms["error"][0, 2] == full.score.error[0]

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import torch
 
-from shotenv.decision.acquire import _sum_pixels
-from shotenv.decision.score import _score
+from shotenv.decision.measurement import sum_pixels_
+from shotenv.decision.score import score_pixels_
 from shotenv.sensor import pixels
 from unwrap.support.compiled import array, loop
 
@@ -77,13 +77,13 @@ def test_scores_and_features_are_those_of_the_python_loops(draw):
     distance_m[0, 0, :3] = np.nan
     valid, scored, saturated = (draw(frames) < 0.7 for _ in range(3))
     found = [np.empty((5, 2)) for _ in range(2)]
-    for score, into in zip((_score, _score.py_func), found, strict=True):
+    for score, into in zip((score_pixels_, score_pixels_.py_func), found, strict=True):
         scale_m, near_m = np.float32(0.5), np.float32(3.0)
         score(distance_m, valid, truth_m, scored, scale_m, near_m, 25.0, into)
     assert np.allclose(*found, rtol=1e-12)
     maps, predicted_m = [draw(frames, 0.1, 50.0) for _ in range(3)], draw(frames, 0.0, 25.0)
     sums = [np.empty((6, 2)) for _ in range(2)]
-    for sum_pixels, into in zip((_sum_pixels, _sum_pixels.py_func), sums, strict=True):
+    for sum_pixels, into in zip((sum_pixels_, sum_pixels_.py_func), sums, strict=True):
         sum_pixels(*maps, valid, saturated, truth_m, predicted_m, into)
     assert np.allclose(*sums, rtol=1e-12)
 

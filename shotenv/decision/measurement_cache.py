@@ -1,0 +1,81 @@
+"""A cache of measurements: the same numbers, faster where drives come again."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import torch
+from torch import Tensor
+
+from shotenv.decision.drive import Drive
+from shotenv.decision.measurement import Measurement, measure_frames
+from shotenv.decision.problem import Problem
+from shotenv.decision.score import DepthScore
+from unwrap.signal import Shots
+from unwrap.support import take
+
+SCORES = tuple(field.name for field in dataclasses.fields(DepthScore))
+MOST_KEPT = 500_000
+"""Frames, counted once for each number of samples, that a cache keeps: some 0.3 GB, or all
+choices in 650 drives of 256 frames."""
+
+
+class MeasurementCache:
+    """`measure_frames`, keeping what each (drive, frame, shots) gave; for one problem.
+
+    What an acquisition gives depends on the drive, the frame and the shots alone, so an
+    environment that plays the same drives again need not acquire again. What comes first is kept,
+    up to `most_kept` frames, and later ones are measured every time: with drives that come in
+    turns, dropping the oldest for the newest would lose each of them just before its return.
+
+    Parameters
+    ----------
+    most_kept : int
+        Bound of what is kept.
+    """
+
+    def __init__(self, most_kept: int = MOST_KEPT) -> None:
+        self.most_kept = most_kept
+        self._rows: dict[tuple[int, int, int], list[float]] = {}
+
+    def __len__(self) -> int:
+        """Frames kept, counted once for each number of samples."""
+        return len(self._rows)
+
+    def __call__(
+        self,
+        problem: Problem,
+        drive: Drive,
+        step: Tensor,
+        shots: Shots,
+        power_w: Tensor | None = None,
+    ) -> Measurement:
+        """As `measure_frames`, for the frames at `step` [B] of `drive`."""
+        # A derated laser has a power of its own every time, which hardly ever comes again.
+        if power_w is not None and drive.is_derated(power_w):
+            return measure_frames(problem, drive, step, shots, power_w)
+        keys = [
+            (seed, frame, int(shots))
+            for seed, frame in zip(drive.seed.tolist(), step.tolist(), strict=True)
+        ]
+        missing = [i for i, key in enumerate(keys) if key not in self._rows]
+        new = {}
+        if missing:
+            rows = torch.tensor(missing)
+            measured = measure_frames(problem, take(drive, rows), step[rows], shots)
+            new = {keys[i]: row for i, row in zip(missing, _to_rows(measured), strict=True)}
+        found = _from_rows([new.get(key) or self._rows[key] for key in keys])
+        if len(self._rows) + len(new) <= self.most_kept:
+            self._rows |= new
+        return found
+
+
+def _to_rows(measured: Measurement) -> list[list[float]]:
+    columns = [getattr(measured.score, name) for name in SCORES]
+    return torch.cat((torch.stack(columns, dim=1), measured.features.double()), dim=1).tolist()
+
+
+def _from_rows(rows: list[list[float]]) -> Measurement:
+    values = torch.tensor(rows, dtype=torch.float64)
+    score = DepthScore(*values[:, : len(SCORES)].T)
+    return Measurement(score, values[:, len(SCORES) :].to(torch.float32))

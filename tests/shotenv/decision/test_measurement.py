@@ -1,0 +1,71 @@
+"""Measuring a batch: each drive with its own shots, the offset, and what shots cannot tell."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+import torch
+
+from shotenv.config.keywords import env_config
+from shotenv.decision.acquire import acquire_depth, offset_to_subtract_lsb
+from shotenv.decision.features import SEEN_FEATURES
+from shotenv.decision.measurement import measure_by_shots, measure_frames
+from shotenv.decision.problem import open_problem
+from shotenv.decision.transition import reset, step
+from unwrap.signal.shots import Shots
+
+NAMES = [feature.name for feature in SEEN_FEATURES]
+
+
+@pytest.fixture(scope="module")
+def problem(tiny_kwargs, session_cache):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SHOTENV_CACHE", session_cache)
+        return open_problem(env_config(**tiny_kwargs))
+
+
+def test_every_drive_is_measured_with_its_own_shots(problem):
+    state = reset(problem, [1, 2, 3, 4])
+    power_w = state.drive.laser_power_w
+    shots = torch.tensor([8, 0, 2, 8])
+    found = measure_by_shots(problem, state, shots, power_w, measure_frames)
+    assert found.score.error[1] == 1.0 and found.score.valid_share[1] == 0.0
+    for row, count in ((0, Shots.EIGHT), (2, Shots.TWO), (3, Shots.EIGHT)):
+        alone = reset(problem, [row + 1])
+        one = measure_frames(problem, alone.drive, alone.step, count)
+        for field in dataclasses.fields(one.score):
+            assert getattr(one.score, field.name)[0] == getattr(found.score, field.name)[row]
+        told = [feature.least_shots <= count for feature in SEEN_FEATURES]
+        assert torch.equal(found.features[row, told], one.features[0, told])
+
+
+def test_what_few_shots_cannot_tell_stays_as_more_told_it(problem):
+    state, _ = step(problem, reset(problem, [1, 2]), torch.tensor([2, 1]))
+    first = state.seen.features
+    residual, disagreement = NAMES.index("residual"), NAMES.index("disagreement")
+    assert (first[:, residual] > 0).all()
+    assert first[0, disagreement] > 0 and first[1, disagreement] == 0
+    state, _ = step(problem, state, torch.tensor([0, 0]))
+    second = state.seen.features
+    assert torch.equal(second[:, [residual, disagreement]], first[:, [residual, disagreement]])
+    assert not torch.equal(second[:, NAMES.index("amplitude")], first[:, NAMES.index("amplitude")])
+    assert state.seen.since_four.tolist() == [1, 1]
+    assert state.seen.since_eight.tolist() == [1, 1002]
+
+
+def test_the_stored_offset_is_needed_with_two_samples_alone(problem):
+    """An offset that is stored wrong shows in the phase of 2 DCS; 4 and 8 cancel what there is."""
+    state = reset(problem, [5])
+    stored = state.drive.offsets.calibrated_lsb
+    wrong = dataclasses.replace(
+        state.drive,
+        offsets=dataclasses.replace(state.drive.offsets, calibrated_lsb=stored + 30.0),
+    )
+    for shots in Shots:
+        maps = [
+            acquire_depth(problem, drive, state.step, shots).depth.phase_rad
+            for drive in (state.drive, wrong)
+        ]
+        assert torch.equal(*maps) == (shots != Shots.TWO)
+    assert offset_to_subtract_lsb(state.drive, Shots.TWO) is stored
