@@ -1,4 +1,4 @@
-"""TODO."""
+"""Configuration of a bank: its worlds, the camera that looks at them, and how many clips of each."""
 
 from __future__ import annotations
 

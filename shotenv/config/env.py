@@ -1,4 +1,4 @@
-"""TODO."""
+"""Configuration of the decision problem: sensor, laser, bank, network, merging and reward."""
 
 from __future__ import annotations
 

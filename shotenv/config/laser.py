@@ -1,4 +1,4 @@
-"""TODO."""
+"""Configuration of the light source: power, heat, ageing and eye safety."""
 
 from __future__ import annotations
 
