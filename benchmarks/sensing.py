@@ -12,7 +12,7 @@ from benchmarks.turns import alternately
 from shotenv.config.reader import find_config, read_config
 from shotenv.config.sensor import SensorConfig
 from shotenv.sensor import acquire
-from shotenv.sensor.acquisition import light_of, sensitivity
+from shotenv.sensor.acquisition import incident_light, sensitivity
 from shotenv.sensor.exposure import Exposure
 from shotenv.sensor.noise import Purpose, noise_samples, stream
 from shotenv.sensor.offsets import draw_offsets
@@ -48,7 +48,7 @@ def measured(threads: int) -> dict:
 
     def sense() -> None:
         noise = noise_samples([0], [0], HEIGHT, WIDTH)
-        light = light_of(exposure, per_light)
+        light = incident_light(exposure, per_light)
         raw = acquire(light, sensor, shots=Shots.EIGHT, noise=noise, offsets=offsets)
         for first in (0, SAMPLES_PER_FREQUENCY):
             decode(raw.dcs_lsb[:, first : first + SAMPLES_PER_FREQUENCY])

@@ -118,7 +118,7 @@ def render(arguments: Namespace) -> int:
 
 def bank_info(arguments: Namespace) -> int:
     """Tell what is in a bank, or which banks there are."""
-    from shotenv.bank import describe_bank, known_banks, open_bank, print_bank, print_banks
+    from shotenv.bank import contents_of, known_banks, open_bank, print_banks, print_contents
 
     if arguments.bank is None:
         banks = known_banks()
@@ -126,8 +126,8 @@ def bank_info(arguments: Namespace) -> int:
         _write_json(arguments, banks)
         return DONE
     bank = open_bank(arguments.bank, render=False)
-    about = describe_bank(bank)
-    print_bank(about)
+    about = contents_of(bank)
+    print_contents(about)
     if arguments.sheet is not None:
         _write_sheet(bank, arguments.sheet, arguments.clips)
     _write_json(arguments, about)
@@ -170,6 +170,7 @@ def unwrap_train(arguments: Namespace) -> int:
 
 def unwrap_evaluate(arguments: Namespace) -> int:
     """Measure an unwrapping network."""
+    from shotenv.bank import open_bank
     from shotenv.config import env_config
     from shotenv.dataset import measure_unwrapping, print_unwrapping
     from shotenv.decision import open_problem
@@ -177,6 +178,9 @@ def unwrap_evaluate(arguments: Namespace) -> int:
 
     load_unwrapper(arguments.unwrapper)  # refused before a bank is rendered for it
     chosen = {name: arguments[name] for name in ("bank", "unwrapper", "split")}
+    # Every frame stands alone here: a bank of any frame rate will do.
+    if (rendered := open_bank(arguments.bank).config) is not None:
+        chosen["frame_rate_hz"] = rendered.world.frame_rate_hz
     problem = open_problem(env_config(**chosen))
     frames = sum(clip.frames for clip in problem.clips)
     with progress(frames, "unwrapping", "frame") as bar:

@@ -10,8 +10,8 @@
 A field is one line in its model: name, type with its bounds, default, description. From there it is
 a key in YAML files, a keyword of `env_config` and of `gym.make`, an option of the command line
 (`--env.laser.trip_k 340`), and a line in `--help`. Numbers are in SI units (but `_nm`, `_deg` and
-`_ev`), and the name ends in the unit: `_m _s _hz _w _j _k _e _lsb`. A sensor's field counts as baked
-into banks until `ACQUISITION_FIELDS` names it; see there.
+`_ev`), and the name ends in the unit: `_m _s _hz _w _j _k _e _lsb`. A field of the sensor counts as
+baked into banks until `ACQUISITION_FIELDS` names it; see there.
 
 A section within another, such as the sensor of an environment, is given as
 

@@ -1,4 +1,4 @@
-"""Configuration of a bank: its worlds, the camera that looks at them, and how many clips of each."""
+"""Configuration of a bank: worlds, the camera that looks at them, number of clips."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names of the splits of a bank and of the families of scenes; the families are in `shotenv.world`."""
+"""Names of a bank's splits and of the families of scenes, which `shotenv.world` draws."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""YAML files to models, and changes to models: whatever enters is checked here, and refused by name."""
+"""YAML files to models, and changes to models: what enters is checked, and refused by name."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from shotenv.decision.problem import Problem
 from shotenv.decision.score import DepthScore, score_depth
 from shotenv.sensor import (
     acquire,
-    light_of,
+    incident_light,
     noise_samples,
     sample_noise_lsb,
     scored_pixels,
@@ -93,9 +93,9 @@ def acquire_depth(
     if noise is None:
         noise = noise_of(drive, step, bank.height, bank.width)
     exposure = bank.exposure(frames)
-    full = light = light_of(exposure, drive.sensitivity)
+    full = light = incident_light(exposure, drive.sensitivity)
     if power_w is not None:
-        light = light_of(exposure, sensitivity(sensor, power_w, drive.integration_s))
+        light = incident_light(exposure, sensitivity(sensor, power_w, drive.integration_s))
     raw = acquire(light, sensor, shots=shots, noise=noise, offsets=drive.offsets)
     scored = scored_pixels(full, exposure.distance_m, sensor)
     noise_lsb = sample_noise_lsb(

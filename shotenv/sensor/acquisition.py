@@ -16,7 +16,7 @@ from shotenv.sensor.converter import signed_limits_lsb
 from shotenv.sensor.electrons import electrons_per_radiance_second
 from shotenv.sensor.exposure import Exposure
 from shotenv.sensor.offsets import OffsetPattern
-from shotenv.sensor.pixels import Light, Pixel, strong_pixels, take_sample
+from shotenv.sensor.pixel_loops import IncidentLight, Pixel, strong_pixels, take_sample
 from unwrap.signal import RawFrame, Shots
 from unwrap.support import array
 
@@ -57,7 +57,7 @@ def expose(
     check_exposure(exposure, shots)
     check_settings(exposure, shots, laser_power_w, integration_s, noise)
     samples = None if noise is None else noise.unbind(1)
-    light = light_of(exposure, sensitivity(sensor, laser_power_w, integration_s))
+    light = incident_light(exposure, sensitivity(sensor, laser_power_w, integration_s))
     return acquire(light, sensor, shots=shots, noise=samples, offsets=offsets)
 
 
@@ -85,7 +85,7 @@ def sensitivity(sensor: SensorConfig, laser_power_w: Tensor, integration_s: Tens
 
 
 def acquire(
-    light: Light,
+    light: IncidentLight,
     sensor: SensorConfig,
     *,
     shots: Shots,
@@ -113,7 +113,7 @@ def acquire(
     return RawFrame(torch.from_numpy(dcs_lsb), torch.from_numpy(saturated))
 
 
-def scored_pixels(light: Light, truth_m: Tensor, sensor: SensorConfig) -> Tensor:
+def scored_pixels(light: IncidentLight, truth_m: Tensor, sensor: SensorConfig) -> Tensor:
     """Pixels that count, bool [B, H, W], whatever is measured there.
 
     Truth [B, H, W] within `max_range_m`, noise-free signal to noise of one sample,
@@ -132,9 +132,9 @@ def scored_pixels(light: Light, truth_m: Tensor, sensor: SensorConfig) -> Tensor
     return torch.from_numpy(scored)
 
 
-def light_of(exposure: Exposure, per_light: Sensitivity) -> Light:
+def incident_light(exposure: Exposure, per_light: Sensitivity) -> IncidentLight:
     """Light as the loops over pixels take it, of exposures in memory."""
-    return Light(
+    return IncidentLight(
         correlation=array(exposure.correlation),
         active=array(exposure.active),
         ambient=array(exposure.ambient),

@@ -10,7 +10,7 @@ from shotenv.config import SensorConfig
 from shotenv.sensor.acquisition import pixel_of
 from shotenv.sensor.converter import full_scale_lsb
 from shotenv.sensor.electrons import electrons_per_radiance_second
-from shotenv.sensor.pixels import noise_by_gray, take_gray
+from shotenv.sensor.pixel_loops import noise_by_gray, take_gray
 from unwrap.support import array
 
 SHORTEST_EXPOSURE_S = 1e-5

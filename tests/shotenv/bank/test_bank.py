@@ -11,17 +11,12 @@ import pytest
 import torch
 
 from shotenv.bank import build as build_module
-from shotenv.bank.build import bank_folder as bank_folder_of, build_bank, clip_jobs
+from shotenv.bank.build import build_bank
+from shotenv.bank.clip_jobs import clip_jobs
+from shotenv.bank.folders import bank_folder as bank_folder_of
+from shotenv.bank.layout import ARRAYS, BankError, frame_bytes
 from shotenv.bank.opening import open_bank
-from shotenv.bank.store import (
-    ARRAYS,
-    BankError,
-    frame_bytes,
-    read_clip_record,
-    verify,
-    write_clip,
-    write_manifest,
-)
+from shotenv.bank.store import read_clip_record, verify, write_clip, write_manifest
 from shotenv.config.bank import BankConfig
 from shotenv.config.families import FAMILIES, SHIFT_FAMILIES
 from shotenv.config.reader import ConfigError, find_config, merged, read_config

@@ -10,17 +10,18 @@ import pytest
 from PIL import Image
 
 from agents.cli.entry import main
-from shotenv.bank.build import bank_folder, clip_jobs
-from shotenv.bank.listing import known_banks
-from shotenv.bank.opening import open_bank
-from shotenv.bank.overview import (
+from shotenv.bank.clip_jobs import clip_jobs
+from shotenv.bank.contact_sheets import (
     choose,
     clips_by_family,
     color_maps,
     contact_sheet,
     quantities,
 )
-from shotenv.bank.store import BankError
+from shotenv.bank.contents import known_banks
+from shotenv.bank.folders import bank_folder
+from shotenv.bank.layout import BankError
+from shotenv.bank.opening import open_bank
 from shotenv.config.bank import BankConfig
 from shotenv.config.families import FAMILIES
 from shotenv.config.reader import find_config, read_config

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from shotenv.bank.build import bank_bytes, bank_folder, clips_standing, rendering_minutes
-from shotenv.bank.frames_reader import Bank
-from shotenv.bank.store import MANIFEST, frame_bytes
+from shotenv.bank.bank import Bank
+from shotenv.bank.build import bank_bytes, clips_standing, rendering_minutes
+from shotenv.bank.folders import bank_folder
+from shotenv.bank.layout import MANIFEST, frame_bytes
 from shotenv.config import BankConfig, configs_dir, read_config
 
 
@@ -53,7 +54,7 @@ def _state(bank: dict[str, Any]) -> str:
     return f"{state}, about {bank['minutes_left']:.0f} minutes to render"
 
 
-def describe_bank(bank: Bank) -> dict[str, Any]:
+def contents_of(bank: Bank) -> dict[str, Any]:
     """Size, frames of each family in each split, and the configuration of `bank`."""
     splits: dict[str, dict[str, int]] = {}
     for clip in bank.clips:
@@ -73,8 +74,8 @@ def describe_bank(bank: Bank) -> dict[str, Any]:
     }
 
 
-def print_bank(about: dict[str, Any]) -> None:
-    """What `describe_bank` found."""
+def print_contents(about: dict[str, Any]) -> None:
+    """The `contents_of` a bank, as words and a table."""
     print(
         f"{about['name']}: {about['frames']} frames of {_pixels(about)} pixels in "
         f"{about['clips']} clips, {_gigabytes(about['bytes'])}"

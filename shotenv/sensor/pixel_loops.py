@@ -16,7 +16,7 @@ Array = np.ndarray
 HALF, ZERO = np.float32(0.5), np.float32(0.0)
 
 
-class Light(NamedTuple):
+class IncidentLight(NamedTuple):
     """Noise-free light of B frames, and what it is worth in electrons of one sample, float32.
 
     Attributes
@@ -98,7 +98,7 @@ def ambient_offset_lsb(ambient_e, full_well_e, lsb_per_e):
 @loop
 def take_sample(
     number: int,
-    light: Light,
+    light: IncidentLight,
     normals: Array,
     pattern_lsb: Array,
     pixel: Pixel,
@@ -183,7 +183,12 @@ def take_gray(
 
 @loop
 def strong_pixels(
-    light: Light, pixel: Pixel, truth_m: Array, range_m: np.float32, snr: np.float32, strong: Array
+    light: IncidentLight,
+    pixel: Pixel,
+    truth_m: Array,
+    range_m: np.float32,
+    snr: np.float32,
+    strong: Array,
 ) -> None:
     """Where truth lies within a range and one sample's noise-free signal to noise is above `snr`.
 

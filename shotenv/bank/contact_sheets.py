@@ -10,8 +10,8 @@ import numpy as np
 import torch
 from PIL import Image
 
-from shotenv.bank.frames_reader import Bank, Clip
-from shotenv.bank.store import BankError
+from shotenv.bank.bank import Bank, Clip
+from shotenv.bank.layout import BankError
 from shotenv.config import SensorConfig
 from shotenv.sensor import full_scale_lsb
 from unwrap.pictures import (
