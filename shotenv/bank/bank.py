@@ -86,7 +86,7 @@ class MappedClips:
                 self._mapped[clip] = self._map(self._folders[clip])
                 if len(self._mapped) > self._most:
                     self._mapped.popitem(last=False)
-            self._mapped.move_to_end(clip)
+            self._mapped.move_to_end(clip)  # The one unused for longest comes first.
             return self._mapped[clip]
 
     @staticmethod
@@ -116,6 +116,7 @@ class Bank:
             Clip(c.name, c.family, c.seed, c.split, start, c.frames)
             for c, start in zip(self.manifest.clips, starts, strict=False)
         )
+        # For each frame of the bank the number of its clip.
         self._clip_of_frame = np.repeat(np.arange(len(self.clips)), [c.frames for c in self.clips])
         self._arrays = MappedClips([self.folder / clip.folder for clip in self.manifest.clips])
         self.time_s = self._per_frame("time_s")

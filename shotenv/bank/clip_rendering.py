@@ -37,6 +37,7 @@ def render_clip(job: ClipJob) -> str:
     generator = torch.Generator().manual_seed(_seed(job.seed, GRAY_NOISE))
     noise = torch.randn(light["ambient"].shape, generator=generator)
     gray, exposure_s = capture_gray(torch.from_numpy(light["ambient"]), config.sensor, noise=noise)
+    # Speed and yaw rate do not change within a clip, but a recording's may: one value per frame.
     constant = np.ones(len(times))
     metadata = {
         "name": job.name,
@@ -63,6 +64,7 @@ def _render_frames(
     coarse = {"width": camera.width // METER_REDUCTION, "height": camera.height // METER_REDUCTION}
     meter = camera.model_copy(update=coarse)
     renderer = FrameRenderer(world, sensor)
+    # The meter's look has a seed of its own, as if it were one frame more.
     frames = [renderer.frame(float(times[0]), meter, seed=_seed(seed, len(times)))]
     for number, time in enumerate(times):
         light = torch.from_numpy(frames[-1].ambient).unsqueeze(0)

@@ -18,6 +18,7 @@ def known_banks() -> list[dict[str, Any]]:
 
 
 def _planned(config: BankConfig) -> dict[str, Any]:
+    """Size of the bank of `config`, standing or not, and how far its rendering has come."""
     standing, clips = clips_standing(config)
     frames = clips * config.world.frames_per_clip
     missing = (clips - standing) * config.world.frames_per_clip
@@ -30,6 +31,7 @@ def _planned(config: BankConfig) -> dict[str, Any]:
         "bytes": bank_bytes(config, frames),
         "clips": clips,
         "clips_standing": standing,
+        # Clips that stand without a manifest are a rendering that goes on, or was cut off.
         "rendered": standing == clips and (folder / MANIFEST).is_file(),
         "minutes_left": rendering_minutes(config, missing) if missing else 0.0,
         "folder": str(folder),

@@ -61,6 +61,7 @@ def keep_predictions(bank: Bank, unwrapper: Unwrapper) -> KeptPredictions:
     OSError
         They could not be written, or not be read again.
     """
+    # By content: another bank or other weights under the same name are not mistaken for these.
     name = f"{bank.fingerprint}-{unwrapper.fingerprint[:16]}"
     stride = unwrapper.stride(bank.height, bank.width)
     if stride > 1:

@@ -100,7 +100,7 @@ def _checked_shape(arrays: Mapping[str, np.ndarray]) -> tuple[int, int, int]:
     missing = set(ARRAYS) - set(arrays)
     if missing:
         raise BankError(f"clip lacks the arrays {sorted(missing)}")
-    frames, height, width = arrays["gray"].shape
+    frames, height, width = arrays["gray"].shape  # It has no channels between.
     for name, spec in ARRAYS.items():
         array, shape = arrays[name], (frames, *spec.channels, height, width)
         if array.shape != shape or array.dtype != spec.dtype:

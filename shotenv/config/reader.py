@@ -38,6 +38,7 @@ def find_config(section: str, name: str) -> Path:
         There is no such name and no such file.
     """
     shipped = configs_dir() / section
+    # Names first: a file or folder of that name may lie about in the working directory.
     for candidate in (shipped / f"{name}.yaml", Path(name)):
         if candidate.is_file():
             return candidate

@@ -118,6 +118,7 @@ class SensorConfig(Section):
 
     @model_validator(mode="after")
     def _demodulates_at_most_all(self) -> SensorConfig:
+        # Overtones are demodulated along with the fundamental, each with its own weight.
         weights = harmonic_weights(self.harmonic_strength, self.highest_harmonic)
         demodulated = self.contrast * sum(weight for _, weight in weights)
         if demodulated > 1.0:
