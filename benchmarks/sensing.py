@@ -15,7 +15,7 @@ from shotenv.sensor import (
     Purpose,
     acquire,
     draw_offsets,
-    light_of,
+    incident_light,
     noise_samples,
     sensitivity,
     stream,
@@ -52,7 +52,7 @@ def measured(threads: int) -> dict:
 
     def sense() -> None:
         noise = noise_samples([0], [0], HEIGHT, WIDTH)
-        light = light_of(exposure, per_light)
+        light = incident_light(exposure, per_light)
         raw = acquire(light, sensor, shots=Shots.EIGHT, noise=noise, offsets=offsets)
         for first in (0, SAMPLES_PER_FREQUENCY):
             decode(raw.dcs_lsb[:, first : first + SAMPLES_PER_FREQUENCY])

@@ -78,8 +78,10 @@ def scene_at(family: str, seed: int, time_s: float) -> tuple[np.ndarray, np.ndar
     return distance, albedo, float(speed_m_s)
 
 
-def light_of(family: str, seed: int, time_s: float, sensor: SensorConfig) -> dict[str, np.ndarray]:
-    """Closed-form light of one frame: one bounce, every sample at its own instant."""
+def closed_form_light(
+    family: str, seed: int, time_s: float, sensor: SensorConfig
+) -> dict[str, np.ndarray]:
+    """Light of one frame: one bounce, every sample at its own instant."""
     times = [time_s + t for t in sample_times_s(8, sensor.sample_period_s)]
     frequencies = (sensor.f1_hz, sensor.f2_hz)
     weights = harmonic_weights(sensor.harmonic_strength, sensor.highest_harmonic)
@@ -110,7 +112,7 @@ def write_tiny_bank(folder, sensor: SensorConfig) -> None:
         family = FAMILIES[number % len(FAMILIES)]
         split = ("train", "validation", "test")[number // len(FAMILIES) % 3]
         times = [0.1 * i for i in range(FRAMES_PER_CLIP)]
-        light = [light_of(family, number, time, sensor) for time in times]
+        light = [closed_form_light(family, number, time, sensor) for time in times]
         arrays = {name: np.stack([frame[name] for frame in light]) for name in light[0]}
         noise = torch.randn(
             arrays["ambient"].shape, generator=torch.Generator().manual_seed(number)

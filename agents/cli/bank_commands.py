@@ -50,10 +50,10 @@ def tell_about_banks(arguments: Namespace) -> int:
     """Tell what is in a bank, or which banks there are."""
     from shotenv.bank import (
         contact_sheet,
-        describe_bank,
+        contents_of,
         known_banks,
         open_bank,
-        print_bank,
+        print_contents,
         print_banks,
     )
 
@@ -63,8 +63,8 @@ def tell_about_banks(arguments: Namespace) -> int:
         write_numbers(arguments, banks)
         return DONE
     bank = open_bank(arguments.bank, render=False)
-    about = describe_bank(bank)
-    print_bank(about)
+    about = contents_of(bank)
+    print_contents(about)
     if arguments.sheet is not None:
         content = io.BytesIO()
         contact_sheet(bank, clips=arguments.clips).save(content, format="PNG")

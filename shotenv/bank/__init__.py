@@ -1,7 +1,20 @@
-"""Sequences of frames on disk.
+"""Sequences of frames on disk: rendered once, then read by whoever plays, trains or measures.
 
 `open_bank("starter")` opens a bank by the name of its configuration and renders it into the
 user's cache folder on first use; `open_bank("path/to/bank")` opens a folder.
+
+    layout.py           what lies in a bank's folder: arrays, records, table of contents
+    store.py            writing that whole or not at all; reading and verifying it
+    folders.py          where a bank lies, and which configuration it is of
+    clip_jobs.py        which clips a configuration asks for
+    clip_rendering.py   one clip from its seed
+    build.py            all that are missing, by worker processes
+    opening.py          a bank by name or path
+    bank.py             a bank that is open: its clips, splits and frames
+    compatibility.py    whether a sensor and a frame rate are those it was made for
+    contents.py         what is in a bank, and which there are, in words and numbers
+    contact_sheets.py   what it looks like
+    predictions.py      what networks make of its gray images, kept
 """
 
 import lazy_loader

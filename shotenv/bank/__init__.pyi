@@ -1,13 +1,15 @@
-from .build import build_bank as build_bank, cache_dir as cache_dir
-from .fits import check_fits as check_fits
-from .frames_reader import Bank as Bank, BankFrame as BankFrame, Clip as Clip
-from .listing import (
-    describe_bank as describe_bank,
+from .bank import Bank as Bank, BankFrame as BankFrame, Clip as Clip
+from .build import build_bank as build_bank
+from .compatibility import check_fits as check_fits
+from .contact_sheets import contact_sheet as contact_sheet
+from .contents import (
+    contents_of as contents_of,
     known_banks as known_banks,
-    print_bank as print_bank,
     print_banks as print_banks,
+    print_contents as print_contents,
 )
+from .folders import cache_dir as cache_dir
+from .layout import BankError as BankError
 from .opening import open_bank as open_bank
-from .overview import contact_sheet as contact_sheet
 from .predictions import KeptPredictions as KeptPredictions, keep_predictions as keep_predictions
-from .store import BankError as BankError, verify as verify
+from .store import verify as verify

@@ -1,11 +1,13 @@
-"""TODO."""
+"""Open a bank by name or path, rendering it first where it does not stand yet."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from shotenv.bank.frames_reader import Bank
-from shotenv.bank.store import MANIFEST, BankError
+from shotenv.bank.bank import Bank
+from shotenv.bank.build import build_bank, clips_standing
+from shotenv.bank.folders import bank_folder
+from shotenv.bank.layout import MANIFEST, BankError
 from shotenv.config import BankConfig, ConfigError, find_config, read_config
 
 
@@ -31,8 +33,6 @@ def open_bank(bank: str | Path, *, render: bool = True) -> Bank:
         path = find_config("bank", str(bank))
     except ConfigError as error:
         raise BankError(f"{error}, or of the folder of a bank") from None
-    from shotenv.bank.build import bank_folder, build_bank, clips_standing
-
     config = read_config(BankConfig, path)
     if render:
         return Bank(build_bank(config))

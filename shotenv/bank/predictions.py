@@ -10,7 +10,6 @@ sha256. Kept predictions that are damaged are computed again.
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import uuid
 from dataclasses import dataclass
@@ -20,9 +19,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from shotenv.bank.build import cache_dir
-from shotenv.bank.frames_reader import Bank
-from shotenv.bank.store import sha256_of
+from shotenv.bank.bank import Bank
+from shotenv.bank.folders import cache_dir
+from shotenv.bank.store import DAMAGED_HEADER, sha256_of, write_array
 from unwrap.networks import Prediction, Unwrapper
 from unwrap.support import progress, write_json
 
@@ -47,12 +46,22 @@ class KeptPredictions:
 
 
 def _rows(maps: Tensor, frames: Tensor) -> Tensor:
+    """Maps of the frames, float32. One after the other: each touches its own pages of the file."""
     rows = [maps.narrow(0, frame, 1) for frame in frames.tolist()]
     return (rows[0] if len(rows) == 1 else torch.cat(rows)).to(torch.float32)
 
 
 def keep_predictions(bank: Bank, unwrapper: Unwrapper) -> KeptPredictions:
-    """Predictions of `unwrapper` for `bank`, from the cache folder or computed now."""
+    """Predictions of `unwrapper` for `bank`, from the cache folder or computed now.
+
+    Computing them takes one pass of the network for each frame, under a bar of progress.
+
+    Raises
+    ------
+    OSError
+        They could not be written, or not be read again.
+    """
+    # By content: another bank or other weights under the same name are not mistaken for these.
     name = f"{bank.fingerprint}-{unwrapper.fingerprint[:16]}"
     stride = unwrapper.stride(bank.height, bank.width)
     if stride > 1:
@@ -74,7 +83,7 @@ def _load(folder: Path, bank: Bank) -> KeptPredictions | None:
         if any(sha256_of(folder / f"{name}.npy") != hashes[name] for name in ARRAYS):
             return None
         maps = [np.load(folder / f"{n}.npy", mmap_mode="c", allow_pickle=False) for n in ARRAYS]
-    except (OSError, ValueError, KeyError, TypeError):
+    except (*DAMAGED_HEADER, KeyError):
         return None
     shape = (len(bank), bank.height, bank.width)
     if any(found.shape != shape or found.dtype != np.float16 for found in maps):
@@ -83,15 +92,13 @@ def _load(folder: Path, bank: Bank) -> KeptPredictions | None:
 
 
 def _compute(folder: Path, bank: Bank, unwrapper: Unwrapper) -> None:
+    """Predict every frame and put the result in `folder`, whole or not at all."""
     temporary = folder.with_name(f".{folder.name}.{uuid.uuid4().hex[:8]}")
     temporary.mkdir(parents=True)
     try:
-        maps = _predict_all(bank, unwrapper)
-        for name, values in zip(ARRAYS, maps, strict=True):
-            _write(temporary / f"{name}.npy", values)
-        write_json(
-            temporary / SUMMARY, {name: sha256_of(temporary / f"{name}.npy") for name in ARRAYS}
-        )
+        maps = zip(ARRAYS, _predict_all(bank, unwrapper), strict=True)
+        hashes = {name: write_array(temporary / f"{name}.npy", values) for name, values in maps}
+        write_json(temporary / SUMMARY, hashes)
         # Another process may have been faster; what stands then is as good unless damaged.
         if _load(folder, bank) is None:
             shutil.rmtree(folder, ignore_errors=True)
@@ -101,6 +108,7 @@ def _compute(folder: Path, bank: Bank, unwrapper: Unwrapper) -> None:
 
 
 def _predict_all(bank: Bank, unwrapper: Unwrapper) -> tuple[np.ndarray, np.ndarray]:
+    """Predicted distance and confidence of every frame, each float16 [N, H, W]."""
     shape = (len(bank), bank.height, bank.width)
     distance_m, confidence = np.empty(shape, np.float16), np.empty(shape, np.float16)
     with progress(len(bank), f"{unwrapper.name} predicts", "frame") as bar:
@@ -110,10 +118,3 @@ def _predict_all(bank: Bank, unwrapper: Unwrapper) -> tuple[np.ndarray, np.ndarr
             confidence[index] = prediction.confidence[0].numpy()
             bar.update()
     return distance_m, confidence
-
-
-def _write(path: Path, values: np.ndarray) -> None:
-    with path.open("wb") as file:
-        np.save(file, values, allow_pickle=False)
-        file.flush()
-        os.fsync(file.fileno())

@@ -1,11 +1,7 @@
-"""How a bank lies on disk, and how it gets there whole or not at all.
-
-    <bank>/manifest.json            written last: schema, configuration, one record per clip
-    <bank>/clips/<clip>/clip.json   the clip's own record, with a sha256 per array file
-    <bank>/clips/<clip>/*.npy       one array per quantity, frames first (see `ARRAYS`)
+"""Files of a bank: written whole or not at all, and refused by name when they are damaged.
 
 A clip is written into a hidden folder, flushed, and renamed; so whatever stands under a final
-name is complete. Nothing in a bank is unpickled to be read.
+name is complete. Nothing in a bank is unpickled to be read. What lies where: `shotenv.bank.layout`.
 """
 
 from __future__ import annotations
@@ -14,100 +10,33 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+import tokenize
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import ValidationError
 
-from shotenv.config import BankConfig, Split, one_sentence
+from shotenv.bank.layout import (
+    ARRAYS,
+    CLIP_RECORD,
+    CLIPS,
+    MANIFEST,
+    ArraySpec,
+    BankError,
+    ClipRecord,
+    Manifest,
+)
+from shotenv.config import BankConfig, one_sentence
 from unwrap.support import write_json
 
-SCHEMA_VERSION: Final = 1
-MANIFEST, CLIP_RECORD = "manifest.json", "clip.json"
 LARGEST_JSON_BYTES = 64 * 2**20
+"""A manifest has some 2 kB for each clip."""
 
-
-class BankError(ValueError):
-    """A bank that is missing, damaged or cannot be written; the message names file and cure."""
-
-
-@dataclass(frozen=True)
-class ArraySpec:
-    """One array of a clip: its type, the shape of one frame (before height and width), its unit."""
-
-    dtype: str
-    channels: tuple[int, ...]
-    unit: str
-
-    def frame_bytes(self, height: int, width: int) -> int:
-        """Bytes of one frame."""
-        return int(np.prod((*self.channels, height, width))) * np.dtype(self.dtype).itemsize
-
-
-ARRAYS: Mapping[str, ArraySpec] = {
-    "correlation": ArraySpec("float32", (8,), "W m-2 sr-1 W-1"),
-    "active": ArraySpec("float32", (), "W m-2 sr-1 W-1"),
-    "ambient": ArraySpec("float32", (), "W m-2 sr-1"),
-    "distance_m": ArraySpec("float32", (), "m"),
-    "gray": ArraySpec("uint16", (), "LSB"),
-}
-
-
-class ClipRecord(BaseModel):
-    """What the manifest tells of a clip: where it comes from and what each frame was."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    name: str = Field(pattern=r"^[A-Za-z0-9_-]{1,80}$")
-    family: str = Field(pattern=r"^[A-Za-z0-9_-]{1,80}$")
-    seed: int
-    split: Split
-    frames: int = Field(ge=1)
-    folder: str = Field(pattern=r"^clips/[A-Za-z0-9_-]{1,80}$")
-    time_s: tuple[float, ...]
-    ego_speed_m_s: tuple[float, ...]
-    yaw_rate_rad_s: tuple[float, ...]
-    gray_exposure_s: tuple[float, ...]
-    sha256: dict[str, str]
-
-    @model_validator(mode="after")
-    def _complete(self) -> ClipRecord:
-        for field in ("time_s", "ego_speed_m_s", "yaw_rate_rad_s", "gray_exposure_s"):
-            if len(getattr(self, field)) != self.frames:
-                raise ValueError(f"{field} has {len(getattr(self, field))} values; expected frames")
-        if set(self.sha256) != set(ARRAYS):
-            raise ValueError(f"sha256 names {sorted(self.sha256)}; expected {sorted(ARRAYS)}")
-        return self
-
-
-class Manifest(BaseModel):
-    """The bank's table of contents."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    schema_version: Literal[1] = SCHEMA_VERSION
-    name: str
-    height: int = Field(ge=1, le=4096)
-    width: int = Field(ge=1, le=4096)
-    units: dict[str, str]
-    config: BankConfig | None
-    clips: tuple[ClipRecord, ...] = Field(min_length=1)
-
-    @property
-    def fingerprint(self) -> str:
-        """Sixteen hexadecimal digits that change when any array of the bank changes."""
-        digest = hashlib.sha256()
-        for clip in self.clips:
-            digest.update(json.dumps([clip.name, sorted(clip.sha256.items())]).encode())
-        return digest.hexdigest()[:16]
-
-
-def frame_bytes(height: int, width: int) -> int:
-    """Bytes that one frame takes on disk."""
-    return sum(spec.frame_bytes(height, width) for spec in ARRAYS.values())
+DAMAGED_HEADER = (OSError, ValueError, TypeError, SyntaxError, tokenize.TokenError, RecursionError)
+"""What NumPy raises on headers that are none, for it reads them as Python: `{'shape': (3, ` is a
+TokenError, keys of several types are a TypeError, and a thousand brackets a RecursionError."""
 
 
 def write_clip(
@@ -135,8 +64,9 @@ def write_clip(
     shutil.rmtree(temporary, ignore_errors=True)
     try:
         temporary.mkdir(parents=True)
-        hashes = {name: _write_array(temporary, name, arrays[name]) for name in ARRAYS}
-        record = ClipRecord(**metadata, frames=frames, folder=f"clips/{folder.name}", sha256=hashes)
+        hashes = {n: write_array(temporary / f"{n}.npy", arrays[n]) for n in ARRAYS}
+        where = f"{CLIPS}/{folder.name}"
+        record = ClipRecord(**metadata, frames=frames, folder=where, sha256=hashes)
         write_json(temporary / CLIP_RECORD, {**record.model_dump(), "shape": [height, width]})
         _publish(temporary, folder)
     except OSError as error:
@@ -149,6 +79,7 @@ def write_clip(
 
 
 def _publish(temporary: Path, folder: Path) -> None:
+    """Give a clip that is whole its final name, so that it lasts if the power fails now."""
     try:
         temporary.rename(folder)
     except OSError:
@@ -156,14 +87,20 @@ def _publish(temporary: Path, folder: Path) -> None:
         if not (folder / CLIP_RECORD).is_file():
             raise
         shutil.rmtree(temporary)
-    _flush_folder(folder.parent)
+    # The name is an entry of the folder above, which is flushed like a file.
+    descriptor = os.open(folder.parent, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _checked_shape(arrays: Mapping[str, np.ndarray]) -> tuple[int, int, int]:
+    """Frames, height and width of a clip's arrays, or BankError where they are not sound."""
     missing = set(ARRAYS) - set(arrays)
     if missing:
         raise BankError(f"clip lacks the arrays {sorted(missing)}")
-    frames, height, width = arrays["gray"].shape
+    frames, height, width = arrays["gray"].shape  # It has no channels between.
     for name, spec in ARRAYS.items():
         array, shape = arrays[name], (frames, *spec.channels, height, width)
         if array.shape != shape or array.dtype != spec.dtype:
@@ -173,8 +110,8 @@ def _checked_shape(arrays: Mapping[str, np.ndarray]) -> tuple[int, int, int]:
     return frames, height, width
 
 
-def _write_array(folder: Path, name: str, array: np.ndarray) -> str:
-    path = folder / f"{name}.npy"
+def write_array(path: Path, array: np.ndarray) -> str:
+    """Write an array file, flushed to the disk; returns its SHA-256."""
     with path.open("wb") as file:
         np.save(file, np.ascontiguousarray(array), allow_pickle=False)
         file.flush()
@@ -186,14 +123,6 @@ def sha256_of(path: Path) -> str:
     """SHA-256 of a file, hexadecimal."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def _flush_folder(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def write_manifest(
@@ -222,7 +151,7 @@ def read_clip_record(folder: Path) -> ClipRecord | None:
     if not path.is_file():
         return None
     content = _load_json(path)
-    content.pop("shape", None)
+    content.pop("shape", None)  # For people who look at it; the arrays have it in their headers.
     return _validated(ClipRecord, content, path)
 
 
@@ -281,7 +210,7 @@ def _check_header(path: Path, clip: ClipRecord, spec: ArraySpec, manifest: Manif
                 raise ValueError("unexpected version")
             found, fortran, dtype = np.lib.format.read_array_header_1_0(file)
             length = path.stat().st_size - file.tell()
-    except (OSError, ValueError):
+    except DAMAGED_HEADER:
         raise BankError(f"{path} is missing or damaged; {_cure(path)}") from None
     if found != shape or fortran or dtype != spec.dtype or length != expected:
         raise BankError(
@@ -307,18 +236,13 @@ def verify(folder: Path, *, tick: Callable[[], object] = lambda: None) -> tuple[
     """
     damaged: list[str] = []
     for clip in read_manifest(folder).clips:
-        damaged += [f"{clip.folder}/{name}" for name in _damaged_files(folder / clip.folder, clip)]
+        arrays = {f"{clip.folder}/{name}.npy": digest for name, digest in clip.sha256.items()}
+        damaged += [path for path, digest in arrays.items() if sha256_of(folder / path) != digest]
+        try:
+            same = read_clip_record(folder / clip.folder) == clip
+        except BankError:
+            same = False
+        if not same:
+            damaged.append(f"{clip.folder}/{CLIP_RECORD}")
         tick()
     return tuple(damaged)
-
-
-def _damaged_files(folder: Path, clip: ClipRecord) -> Iterator[str]:
-    for name, digest in clip.sha256.items():
-        if sha256_of(folder / f"{name}.npy") != digest:
-            yield f"{name}.npy"
-    try:
-        same = read_clip_record(folder) == clip
-    except BankError:
-        same = False
-    if not same:
-        yield CLIP_RECORD

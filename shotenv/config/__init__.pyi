@@ -10,4 +10,4 @@ from .reader import (
     one_sentence as one_sentence,
     read_config as read_config,
 )
-from .sensor import SensorConfig as SensorConfig
+from .sensor import ACQUISITION_FIELDS as ACQUISITION_FIELDS, SensorConfig as SensorConfig

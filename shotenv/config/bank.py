@@ -1,4 +1,4 @@
-"""TODO."""
+"""Configuration of a bank: worlds, the camera that looks at them, number of clips."""
 
 from __future__ import annotations
 

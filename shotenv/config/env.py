@@ -1,4 +1,4 @@
-"""TODO."""
+"""Configuration of the decision problem: sensor, laser, bank, network, merging and reward."""
 
 from __future__ import annotations
 
@@ -44,6 +44,7 @@ class EnvConfig(Section):
 
     @model_validator(mode="after")
     def _fits_the_frame(self) -> EnvConfig:
+        # Eight samples fit, whatever is chosen: the frame rate does not depend on the shots.
         frame_s = 1.0 / self.frame_rate_hz
         acquisition_s = 8 * self.sensor.sample_period_s
         if acquisition_s > frame_s:

@@ -1,11 +1,11 @@
-"""TODO."""
+"""Names of a bank's splits and of the families of scenes, which `shotenv.world` draws."""
 
 from __future__ import annotations
 
 from typing import Literal
 
 Split = Literal["train", "validation", "test", "shift"]
-
+"""`shift` holds clips of families that no other split has."""
 
 Family = Literal[
     "sunny_road",
@@ -19,9 +19,8 @@ Family = Literal[
     "snowy_street",
 ]
 
-
 FAMILIES: tuple[Family, ...] = ("sunny_road", "overcast_street", "garage", "tunnel", "night_road")
-
+"""Families of all splits but `shift`, unless a bank says otherwise."""
 
 SHIFT_FAMILIES: tuple[Family, ...] = (
     "warehouse",

@@ -1,4 +1,8 @@
-"""Keyword arguments of an environment to its configuration."""
+"""Keyword arguments of an environment to its configuration: plain JSON values to `EnvConfig`.
+
+A vector of environments reads the same few files again and again: the last 32 are kept for the life
+of the process, and read anew when they change on disk (`_read_version`).
+"""
 
 from __future__ import annotations
 
@@ -14,6 +18,7 @@ from shotenv.config.sensor import SensorConfig
 from unwrap.support import Section
 
 SECTIONS: Mapping[str, type[Section]] = {"sensor": SensorConfig, "laser": LaserConfig}
+"""Fields of `EnvConfig` that have a folder of files in `configs/`."""
 
 
 def env_config(config: str = "default", **fields: Any) -> EnvConfig:
@@ -37,27 +42,23 @@ def env_config(config: str = "default", **fields: Any) -> EnvConfig:
     >>> env_config(reward={"power": 0.2}).reward.power
     0.2
     """
-    base = _read(EnvConfig, find_config("env", _text("config", config)))
-    return merged(base, {name: _plain(name, value) for name, value in fields.items()})
+    base = _read(EnvConfig, "env", "config", config)
+    changes = dict(fields)
+    for name, model in SECTIONS.items():
+        if name in fields and not isinstance(fields[name], Mapping):
+            changes[name] = _read(model, name, name, fields[name]).model_dump()
+    return merged(base, changes)
 
 
-def _plain(name: str, value: Any) -> Any:
-    if name not in SECTIONS or isinstance(value, Mapping):
-        return value
-    path = find_config(name, _text(name, value))
-    return _read(SECTIONS[name], path).model_dump()
-
-
-def _text(name: str, value: Any) -> str:
-    if isinstance(value, str | Path):
-        return str(value)
-    raise ConfigError(f"{name} is {value!r}; expected a name, a path or a mapping of values")
+def _read(model: type[Section], section: str, keyword: str, value: Any) -> Any:
+    """The section in the file that `value` names, which was given for `keyword`."""
+    if not isinstance(value, str | Path):
+        raise ConfigError(f"{keyword} is {value!r}; expected a name, a path or a mapping of values")
+    path = find_config(section, str(value))
+    return _read_version(model, path, path.stat().st_mtime_ns)
 
 
 @lru_cache(maxsize=32)
 def _read_version(model: type[Section], path: Path, changed_ns: int) -> Section:
+    """The section in `path` as it was written at `changed_ns`."""
     return read_config(model, path)
-
-
-def _read(model: type[Section], path: Path) -> Any:
-    return _read_version(model, path, path.stat().st_mtime_ns)

@@ -1,4 +1,4 @@
-"""TODO."""
+"""Configuration of the light source: power, heat, ageing and eye safety."""
 
 from __future__ import annotations
 
@@ -64,6 +64,7 @@ class LaserConfig(Section):
 
     @model_validator(mode="after")
     def _effects_possible(self) -> LaserConfig:
+        # A parameter at zero switches its effect off, and then the others need not make sense.
         lost = self.efficiency_slope_per_k * max(self.trip_k - ROOM_K, 0.0)
         if lost >= self.efficiency:
             raise ValueError(
@@ -76,6 +77,7 @@ class LaserConfig(Section):
                 f"derate_k is {self.derate_k:g}; expected below trip_k {self.trip_k:g}, "
                 "where the laser is off"
             )
+        # The junction sits on the case; were it the slower one, it would not be a stage of its own.
         slowest_s = self.thermal_time_constant_s
         if self.junction_resistance_k_per_w and self.junction_time_constant_s >= slowest_s:
             raise ValueError(

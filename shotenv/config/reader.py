@@ -1,4 +1,4 @@
-"""TODO."""
+"""YAML files to models, and changes to models: what enters is checked, and refused by name."""
 
 from __future__ import annotations
 
@@ -6,16 +6,21 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
+import jsonargparse
 from pydantic import ValidationError
 
+from shotenv.config.yaml_limits import LONGEST_TEXT, limit_yaml
 from unwrap.support import Section
+
+# Here and not in `read_config`: the command line's own parsers read files, too, and each of them is
+# made of names that come through this file.
+limit_yaml()
+
+Model = TypeVar("Model", bound=Section)
 
 
 class ConfigError(ValueError):
     """A configuration that cannot be used; the message names field, value and expectation."""
-
-
-Model = TypeVar("Model", bound=Section)
 
 
 def configs_dir() -> Path:
@@ -33,6 +38,7 @@ def find_config(section: str, name: str) -> Path:
         There is no such name and no such file.
     """
     shipped = configs_dir() / section
+    # Names first: a file or folder of that name may lie about in the working directory.
     for candidate in (shipped / f"{name}.yaml", Path(name)):
         if candidate.is_file():
             return candidate
@@ -46,32 +52,31 @@ def read_config(model: type[Model], path: Path, overrides: Sequence[str] = ()) -
     Raises
     ------
     ConfigError
-        An unknown key, a wrong type or a value out of range; the message names the key.
+        An unknown key, a wrong type or a value out of range, named with its key; or YAML that is
+        oversized, or would be when its aliases are expanded.
     """
-    import jsonargparse
-
     parser = jsonargparse.ArgumentParser(exit_on_error=False)
+    # Under a key of its own: `config.name` cannot be taken for an argument of the parser.
     parser.add_class_arguments(model, "config", sub_configs=True)
-    words = [_under(word, "config") for word in overrides]
+    words = [f"--config.{word[2:]}" if word.startswith("--") else word for word in overrides]
     try:
+        if (size := path.stat().st_size) > 4 * LONGEST_TEXT:  # UTF-8 takes up to four bytes each.
+            raise ValueError(f"{size} bytes; expected at most {LONGEST_TEXT} characters")
         return parser.instantiate(parser.parse_args(["--config", str(path), *words])).config
     except (jsonargparse.ArgumentError, ValueError, TypeError, OSError) as error:
         raise ConfigError(f"{path.name}: {one_sentence(error)}") from None
 
 
-def _under(word: str, group: str) -> str:
-    return f"--{group}.{word[2:]}" if word.startswith("--") else word
-
-
 def one_sentence(error: Exception) -> str:
     """What a validation error says, on one line, without the library's own advertising."""
     if isinstance(error, ValidationError):
-        return "; ".join(_describe(detail) for detail in error.errors())
+        return "; ".join(_complaint(detail) for detail in error.errors())
     kept = [line.strip() for line in str(error).splitlines() if "errors.pydantic.dev" not in line]
     return " ".join(" ".join(kept).replace("config.", "").split())
 
 
-def _describe(detail: Any) -> str:
+def _complaint(detail: Any) -> str:
+    """One of the errors that pydantic found, as `field: what was expected, got value`."""
     where = ".".join(str(part) for part in detail["loc"]) or "configuration"
     message = detail["msg"].removeprefix("Value error, ")
     if detail["type"] == "extra_forbidden":
@@ -94,6 +99,7 @@ def merged(base: Model, changes: Mapping[str, Any]) -> Model:
 
 
 def _overlay(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """`base` with the values of `changes`; a mapping changes single values of a mapping."""
     result = dict(base)
     for key, value in changes.items():
         nested = isinstance(value, Mapping) and isinstance(result.get(key), Mapping)

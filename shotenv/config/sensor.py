@@ -14,6 +14,33 @@ Frequency = Annotated[float, Field(ge=1e5, le=1e9)]
 Kelvin = Annotated[float, Field(ge=200.0, le=450.0)]
 
 
+ACQUISITION_FIELDS = frozenset(
+    {
+        "integration_s",
+        "contrast",
+        "offset_std_lsb",
+        "offset_row_share",
+        "offset_calibrated_share",
+        "offset_ambient_lsb",
+        "offset_drift_lsb_per_k",
+        "wiggle_calibrated_share",
+        "distance_drift_m_per_k",
+        "drift_compensated_share",
+        "calibration_temperature_k",
+        "self_heating_k",
+        "min_snr",
+        "saturation_range_m",
+        "max_range_m",
+    }
+)
+"""Fields that are applied when a frame is acquired and corrected: a bank serves all their values.
+
+All others are baked into the light and the gray images of a bank. They are part of its identity
+(`shotenv.bank.folders`), and a bank that was made with another value is refused
+(`shotenv.bank.check_fits`). A new field counts as baked until it is named here.
+"""
+
+
 class SensorConfig(Section):
     """The imager: optics, pixel, converter, timing. Every source is named in the YAML file."""
 
@@ -87,11 +114,11 @@ class SensorConfig(Section):
                 f"integration_s is {self.integration_s}; expected 0 < t < sample_period_s = "
                 f"{self.sample_period_s:g} s"
             )
-        self._check_overtones()
-        self._check_ranges()
         return self
 
-    def _check_overtones(self) -> None:
+    @model_validator(mode="after")
+    def _demodulates_at_most_all(self) -> SensorConfig:
+        # Overtones are demodulated along with the fundamental, each with its own weight.
         weights = harmonic_weights(self.harmonic_strength, self.highest_harmonic)
         demodulated = self.contrast * sum(weight for _, weight in weights)
         if demodulated > 1.0:
@@ -99,8 +126,10 @@ class SensorConfig(Section):
                 f"contrast is {self.contrast:g} and harmonic_strength {self.harmonic_strength:g}: "
                 f"{demodulated:.3f} of the signal would be demodulated; expected at most 1"
             )
+        return self
 
-    def _check_ranges(self) -> None:
+    @model_validator(mode="after")
+    def _ranges_are_unambiguous(self) -> SensorConfig:
         wrap_m = unambiguous_range_m(self.f1_hz)
         if self.saturation_range_m > wrap_m:
             raise ValueError(
@@ -113,3 +142,4 @@ class SensorConfig(Section):
                 f"max_range_m is {self.max_range_m:g}; expected at most the joint range "
                 f"{joint_m:.4g} m of f1_hz = {self.f1_hz:g} and f2_hz = {self.f2_hz:g}"
             )
+        return self

@@ -17,8 +17,8 @@ from shotenv.sensor import (
     Exposure,
     Purpose,
     acquire,
-    describe,
-    light_of,
+    description_of,
+    incident_light,
     noise_samples,
     sample_noise_lsb,
     scored_pixels,
@@ -77,7 +77,7 @@ class SensedFrames:
         self.bank, self.frames, self.range_m = bank, frames, range_m
         self.truth_of, self.stride, self.remembers = truth, stride, remembers
         self._config = config.model_copy(update={"frames_per_drive": 2})
-        self.sensor: SensorDescription = describe(config.sensor)
+        self.sensor: SensorDescription = description_of(config.sensor)
         self.families = [bank.clip_of(index).family for index in frames.tolist()]
         self._drive = lru_cache(maxsize=64)(self._draw_drive)
         self._recorded = lru_cache(maxsize=4096)(self._measured_truth)
@@ -101,7 +101,7 @@ class SensedFrames:
         frames = self.frames[list(numbers)]
         drive = self._drives(frames, draw)
         exposure = self._exposure(frames)
-        light = light_of(exposure, drive.sensitivity)
+        light = incident_light(exposure, drive.sensitivity)
         return scored_pixels(light, exposure.distance_m, self._config.sensor)
 
     def follows(self, number: int) -> bool:
@@ -157,7 +157,7 @@ class SensedFrames:
         return Sensed(
             gray=gray,
             raw=acquire(
-                light_of(exposure, drive.sensitivity),
+                incident_light(exposure, drive.sensitivity),
                 sensor,
                 shots=shots,
                 noise=noise,

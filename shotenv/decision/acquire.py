@@ -12,7 +12,7 @@ from shotenv.decision.drive import Drive
 from shotenv.decision.problem import Problem
 from shotenv.sensor import (
     acquire,
-    light_of,
+    incident_light,
     noise_samples,
     sample_noise_lsb,
     scored_pixels,
@@ -75,9 +75,9 @@ def acquire_depth(
     if noise is None:
         noise = noise_of(drive, step, bank.height, bank.width)
     # Which pixels count must not depend on the action, and derating follows from earlier ones.
-    undiminished = light = light_of(exposure, drive.sensitivity)
+    undiminished = light = incident_light(exposure, drive.sensitivity)
     if power_w is not None and drive.is_derated(power_w):
-        light = light_of(exposure, sensitivity(sensor, power_w, drive.integration_s))
+        light = incident_light(exposure, sensitivity(sensor, power_w, drive.integration_s))
     scored = scored_pixels(undiminished, exposure.distance_m, sensor)
     raw = acquire(light, sensor, shots=shots, noise=noise, offsets=drive.offsets)
     noise_lsb = sample_noise_lsb(

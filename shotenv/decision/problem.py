@@ -11,7 +11,7 @@ from torch import Tensor
 from shotenv.bank import Bank, Clip, KeptPredictions, check_fits, keep_predictions, open_bank
 from shotenv.config import EnvConfig
 from shotenv.decision.scenes import Scenes, look_at_scenes
-from shotenv.sensor import describe
+from shotenv.sensor import description_of
 from unwrap.networks import Unwrapper, load_unwrapper
 from unwrap.signal import SensorDescription
 
@@ -79,14 +79,14 @@ def open_problem(config: EnvConfig) -> Problem:
     Raises
     ------
     ValueError
-        The bank or the network is missing or damaged, the bank was rendered for a sensor with
-        other frequencies or timing, or a network that needs samples was trained for another one.
+        The bank or the network is missing or damaged, the bank was rendered for another sensor or
+        frame rate, or a network that needs samples was trained for other frequencies.
     """
     # Networks first: where one is missing, nobody should wait minutes for a bank to be rendered.
-    description = describe(config.sensor)
+    description = description_of(config.sensor)
     gray, fusion = load_networks(config.unwrapper, description)
     bank = open_bank(config.bank)
-    check_fits(bank, config.sensor)
+    check_fits(bank, config.sensor, frame_rate_hz=config.frame_rate_hz)
     clips = bank.splits(config.split)
     kept = keep_predictions(bank, gray)
     networks = [gray] if fusion is None else [gray, fusion]

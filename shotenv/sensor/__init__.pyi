@@ -2,12 +2,12 @@ from .acquisition import (
     Sensitivity as Sensitivity,
     acquire as acquire,
     expose as expose,
-    light_of as light_of,
+    incident_light as incident_light,
     scored_pixels as scored_pixels,
     sensitivity as sensitivity,
 )
 from .converter import full_scale_lsb as full_scale_lsb
-from .description import describe as describe
+from .description import description_of as description_of
 from .drift import (
     imager_temperature_k as imager_temperature_k,
     residual_drift_m as residual_drift_m,

@@ -16,7 +16,7 @@ from shotenv.sensor.converter import signed_limits_lsb
 from shotenv.sensor.electrons import electrons_per_radiance_second
 from shotenv.sensor.exposure import Exposure
 from shotenv.sensor.offsets import OffsetPattern
-from shotenv.sensor.pixels import Light, Pixel, strong_pixels, take_sample
+from shotenv.sensor.pixel_loops import IncidentLight, Pixel, mark_scored_, take_sample_
 from unwrap.signal import RawFrame, Shots
 from unwrap.support import array
 
@@ -57,7 +57,7 @@ def expose(
     check_exposure(exposure, shots)
     check_settings(exposure, shots, laser_power_w, integration_s, noise)
     samples = None if noise is None else noise.unbind(1)
-    light = light_of(exposure, sensitivity(sensor, laser_power_w, integration_s))
+    light = incident_light(exposure, sensitivity(sensor, laser_power_w, integration_s))
     return acquire(light, sensor, shots=shots, noise=samples, offsets=offsets)
 
 
@@ -80,12 +80,13 @@ class Sensitivity:
 def sensitivity(sensor: SensorConfig, laser_power_w: Tensor, integration_s: Tensor) -> Sensitivity:
     """Sensitivity at a laser power and an integration time, each [B]."""
     ambient_e = electrons_per_radiance_second(sensor) * integration_s
+    # A bank's active light is per watt of the laser.
     active_e = ambient_e * laser_power_w
     return Sensitivity(ambient_e.to(torch.float32), active_e.to(torch.float32))
 
 
 def acquire(
-    light: Light,
+    light: IncidentLight,
     sensor: SensorConfig,
     *,
     shots: Shots,
@@ -100,20 +101,22 @@ def acquire(
     shape = batch, height, width = light.active.shape
     pixel = pixel_of(sensor)
     if offsets is None:
+        # The part that ambient light adds belongs to the pattern, and is left out with it.
         offsets = OffsetPattern(torch.zeros(shape), torch.zeros(shape))
         pixel = pixel._replace(ambient_lsb_per_e=np.float32(0))
     if noise is None:
         noise = repeat(torch.zeros(batch, 2, height, width))
     dcs_lsb = np.empty((batch, int(shots), height, width), np.float32)
     saturated = np.zeros(shape, np.bool_)
-    # A loop trusts shapes: one sensor serves all frames only where that is spelled out.
+    # A compiled loop does not broadcast, and reads on where an array ends: shapes are made equal
+    # here, where a wrong one is still an error.
     made = array(offsets.pattern_lsb.expand(shape)), pixel, dcs_lsb, saturated
     for number, normals in zip(range(shots), noise, strict=False):
-        take_sample(number, light, array(normals), *made)
+        take_sample_(number, light, array(normals), *made)
     return RawFrame(torch.from_numpy(dcs_lsb), torch.from_numpy(saturated))
 
 
-def scored_pixels(light: Light, truth_m: Tensor, sensor: SensorConfig) -> Tensor:
+def scored_pixels(light: IncidentLight, truth_m: Tensor, sensor: SensorConfig) -> Tensor:
     """Pixels that count, bool [B, H, W], whatever is measured there.
 
     Truth [B, H, W] within `max_range_m`, noise-free signal to noise of one sample,
@@ -128,13 +131,13 @@ def scored_pixels(light: Light, truth_m: Tensor, sensor: SensorConfig) -> Tensor
         raise ValueError(f"truth_m is {tuple(truth_m.shape)}; expected {light.active.shape}")
     scored = np.empty(light.active.shape, np.bool_)
     limits = np.float32(sensor.max_range_m), np.float32(sensor.min_snr)
-    strong_pixels(light, pixel_of(sensor), array(truth_m), *limits, scored)
+    mark_scored_(light, pixel_of(sensor), array(truth_m), *limits, scored)
     return torch.from_numpy(scored)
 
 
-def light_of(exposure: Exposure, per_light: Sensitivity) -> Light:
-    """Light as the loops over pixels take it, of exposures in memory."""
-    return Light(
+def incident_light(exposure: Exposure, per_light: Sensitivity) -> IncidentLight:
+    """Light as the loops over pixels take it: arrays, with their worth in electrons."""
+    return IncidentLight(
         correlation=array(exposure.correlation),
         active=array(exposure.active),
         ambient=array(exposure.ambient),
@@ -145,13 +148,14 @@ def light_of(exposure: Exposure, per_light: Sensitivity) -> Light:
 
 @lru_cache(maxsize=64)
 def pixel_of(sensor: SensorConfig) -> Pixel:
-    """Constants that the loops over pixels need of a sensor."""
+    """Constants that the loops over pixels need of a sensor; kept, for every acquisition asks."""
     low_lsb, high_lsb = signed_limits_lsb(sensor.adc_bits)
     return Pixel(
         contrast=np.float32(sensor.contrast),
         read_variance_e=np.float32(sensor.read_noise_e**2),
         full_well_e=np.float32(sensor.full_well_e),
         gain_lsb_per_e=np.float32(sensor.gain_lsb_per_e),
+        # At a full well in both taps it is `offset_ambient_lsb`.
         ambient_lsb_per_e=np.float32(sensor.offset_ambient_lsb / (2.0 * sensor.full_well_e)),
         low_lsb=np.float32(low_lsb),
         high_lsb=np.float32(high_lsb),

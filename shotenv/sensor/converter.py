@@ -6,7 +6,7 @@ from unwrap.signal import mid_scale
 
 
 def signed_limits_lsb(bits: int) -> tuple[float, float]:
-    """Samples of the lowest and the highest word, which report overflow; see `unwrap.signal.words`."""
+    """Samples of the lowest and the highest word, which report overflow; see `unwrap.signal`."""
     middle = mid_scale(bits)
     return 0.0 - middle, full_scale_lsb(bits) - middle
 

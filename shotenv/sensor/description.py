@@ -1,4 +1,4 @@
-"""TODO."""
+"""A configured sensor as the correction knows it, which may be a real camera as well."""
 
 from __future__ import annotations
 
@@ -12,11 +12,17 @@ from unwrap.signal import (
 )
 
 TRUSTED_SPACING = 0.4
-"""Two frequencies are trusted up to this share of the spacing of their wrap candidates."""
+"""Two frequencies are trusted where they agree within this share of their candidates' spacing.
+
+At half the spacing the next pair of wraps would agree as well; see `unwrap.depth.unwrap_dual`.
+"""
 
 
-def describe(sensor: SensorConfig) -> SensorDescription:
-    """What the correction must know of `sensor`."""
+def description_of(sensor: SensorConfig) -> SensorDescription:
+    """What the correction must know of `sensor`: frequencies, ranges, noise, stored calibration.
+
+    Of the optics and the converter it knows nothing: samples and their noise come in LSB.
+    """
     spacing_m = candidate_spacing_m(sensor.f1_hz, sensor.f2_hz, sensor.max_range_m)
     return SensorDescription(
         f1_hz=sensor.f1_hz,

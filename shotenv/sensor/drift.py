@@ -4,9 +4,9 @@ The imager's temperature is a constant of a drive, ambient plus self-heating, an
 what is measured in a frame then does not depend on what was measured before.
 
 The drift is a delay between light and demodulation: every phase of frequency f grows by
-4 pi f drift / c. It is applied to decoded phases (`unwrap.depth.correction.correct`) and not to samples.
-For a sine both are the same rotation of the quadratures; with overtones a delay cannot be
-computed from the samples that a bank stores, and rotating them would turn the wiggle with them.
+4 pi f drift / c. It is applied to decoded phases (`unwrap.depth.correct`) and not to samples. For a
+sine both are the same rotation of the quadratures; with overtones a delay cannot be computed from
+the samples that a bank stores, and rotating them would turn the wiggle with them.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The values that pass between renderer, sensor and environment: frozen, batch first."""
+"""Light as it falls on the sensor, without noise: what a bank holds of its frames."""
 
 from __future__ import annotations
 

@@ -10,10 +10,11 @@ from shotenv.config import SensorConfig
 from shotenv.sensor.acquisition import pixel_of
 from shotenv.sensor.converter import full_scale_lsb
 from shotenv.sensor.electrons import electrons_per_radiance_second
-from shotenv.sensor.pixels import noise_by_gray, take_gray
+from shotenv.sensor.pixel_loops import noise_by_gray_, take_gray_
 from unwrap.support import array
 
 SHORTEST_EXPOSURE_S = 1e-5
+"""What the light meter stops at in a scene however bright, s."""
 
 
 def capture_gray(
@@ -45,9 +46,10 @@ def capture_gray(
         high_lsb=np.float32(full_scale_lsb(sensor.adc_bits)),
     )
     if noise is None:
+        # Without the variance a packet is its charge alone, as it should be without noise.
         noise, pixel = torch.zeros(ambient.shape), pixel._replace(read_variance_e=np.float32(0))
     words = np.empty(ambient.shape, np.int32)
-    take_gray(array(ambient), array(per_light_e), array(noise.expand_as(ambient)), pixel, words)
+    take_gray_(array(ambient), array(per_light_e), array(noise.expand_as(ambient)), pixel, words)
     return torch.from_numpy(words), exposure_s
 
 
@@ -71,10 +73,12 @@ def sample_noise_lsb(
     Ambient shot noise, from the gray image, and read noise: `sqrt(B + 2 sigma_r^2)`. The laser's
     own shot noise is left out; it matters only where the signal is strong anyway.
     """
+    # Electrons in the gray image, scaled from its exposure time to the sample's, are their own
+    # variance: LSB^2 of the sample per word of the gray image.
     squared_gain = sensor.gain_lsb_per_e**2
     gain, per_word = squared_gain / gray_gain_lsb_per_e(sensor), np.empty(len(gray), np.float32)
     per_word[:] = integration_s.numpy() / exposure_s.numpy() * gain
     dark = 2.0 * squared_gain * sensor.read_noise_e**2
     noise_lsb = np.empty(gray.shape, np.float32)
-    noise_by_gray(array(gray, None), per_word, np.float32(dark), noise_lsb)
+    noise_by_gray_(array(gray, None), per_word, np.float32(dark), noise_lsb)
     return torch.from_numpy(noise_lsb)

@@ -9,7 +9,7 @@ from itertools import islice
 import torch
 from torch import Tensor
 
-_MASK = (1 << 64) - 1
+_MASK = (1 << 64) - 1  # Python's integers do not wrap round by themselves.
 
 
 class Purpose(enum.IntEnum):
@@ -18,7 +18,6 @@ class Purpose(enum.IntEnum):
     NOISE = 1
     OFFSETS = 2
     DRIVE = 3
-    GRAY = 4
 
 
 def stream_seed(purpose: Purpose, *words: int) -> int:
@@ -67,5 +66,5 @@ def noise_samples(
 
 
 def draw_noise(seed: int, frame: int, shots: int, height: int, width: int) -> Tensor:
-    """Standard normals of one acquisition, float32 [shots, 2, height, width]; see above."""
+    """Normals of one acquisition, float32 [shots, 2, height, width]; see `noise_samples`."""
     return torch.cat(list(islice(noise_samples([seed], [frame], height, width), int(shots))))

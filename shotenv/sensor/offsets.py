@@ -49,9 +49,11 @@ def draw_offsets(
     row = torch.randn(height, 1, generator=generator)
     pixel = torch.randn(height, width, generator=generator)
     share = sensor.offset_row_share
+    # Variances add up to one.
     unit = math.sqrt(share) * row + math.sqrt(1.0 - share) * pixel
     pattern = (sensor.offset_std_lsb * unit).unsqueeze(0)
     warmer_k = 0.0 if imager_k is None else imager_k - sensor.calibration_temperature_k
+    # Drawn whatever the temperature, so that the generator is left in the same state.
     drift = torch.randn(height, width, generator=generator)
     drift.mul_(sensor.offset_drift_lsb_per_k * warmer_k)
     return OffsetPattern(pattern + drift, sensor.offset_calibrated_share * pattern)

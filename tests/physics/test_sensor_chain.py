@@ -10,7 +10,7 @@ import torch
 from shotenv.config.reader import find_config, merged, read_config
 from shotenv.config.sensor import SensorConfig
 from shotenv.sensor.acquisition import expose
-from shotenv.sensor.description import describe
+from shotenv.sensor.description import description_of
 from shotenv.sensor.drift import imager_temperature_k, residual_drift_m
 from shotenv.sensor.electrons import electrons_per_radiance_second
 from shotenv.sensor.exposure import Exposure
@@ -70,7 +70,7 @@ def errors_m(sensor, distance, *, shift_m=None) -> dict[Shots, torch.Tensor]:
     found = {}
     for shots in Shots:
         raw = acquired(exposure, sensor, shots)
-        frame = correct(raw, distance[None], describe(sensor), shift_m=shift_m)
+        frame = correct(raw, distance[None], description_of(sensor), shift_m=shift_m)
         assert frame.valid.all()
         found[shots] = (frame.distance_m - distance)[0]
     return found
@@ -139,7 +139,7 @@ def test_shipped_sensors_measure_alike_with_2_4_and_8_shots(name, walls):
     for error_m in errors_m(fine, walls).values():
         # One word of 0.5 moves the weakest phase by less than a milliradian.
         assert error_m.abs().max() < (left * wiggle_rad + 1e-3) * per_radian_m(fine.f2_hz)
-    assert describe(fine).max_residual_m < 0.5 * candidate_spacing_m(
+    assert description_of(fine).max_residual_m < 0.5 * candidate_spacing_m(
         fine.f1_hz, fine.f2_hz, fine.max_range_m
     )
 
@@ -232,7 +232,7 @@ def slow_dual(wrapped, ranges, known):
 @pytest.mark.parametrize("shots", list(Shots))
 def test_a_slow_loop_over_pixels_gives_the_same_depth(sensor, shots):
     everything = merged(sensor, EVERYTHING)
-    known: SensorDescription = describe(everything)
+    known: SensorDescription = description_of(everything)
     generator = torch.Generator().manual_seed(12)
     unit = torch.rand(3, 16, 16, generator=generator)
     distance, ambient = 0.5 + 22.0 * unit[0], 10.0 ** (3.5 * unit[1] - 3.0)

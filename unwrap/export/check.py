@@ -10,7 +10,7 @@ from jsonargparse import ArgumentParser, Namespace
 from torch import Tensor
 
 from shotenv.config import SensorConfig, env_config
-from shotenv.sensor import describe
+from shotenv.sensor import description_of
 from unwrap.depth import Merge, nearest_wraps
 from unwrap.export.export_frames import ExportFrames, choose_bank, export_frames
 from unwrap.export.onnx_files import OPSET, exported, quantised, run, run_torch, to_onnx
@@ -60,7 +60,7 @@ def export_files(arguments: Namespace) -> dict[str, Any]:
     config = env_config(sensor=arguments.sensor)
     unwrapper, size = load_unwrapper(arguments.unwrapper), _size(arguments)
     shots = shots_of(unwrapper, arguments.shots)
-    network = exported(unwrapper, describe(config.sensor), arguments.merge)
+    network = exported(unwrapper, description_of(config.sensor), arguments.merge)
     bank = choose_bank(arguments.check_bank, config.sensor)
     frames = export_frames(bank, "test", CHECKED_FRAMES, size, config, shots)
     metadata = metadata_of(unwrapper, arguments.merge, config.sensor, size, shots)

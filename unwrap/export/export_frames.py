@@ -12,7 +12,7 @@ from torch.nn import functional
 from shotenv.bank import Bank, BankError, check_fits, open_bank
 from shotenv.config import EnvConfig, SensorConfig
 from shotenv.dataset import SensedFrames
-from shotenv.sensor import describe
+from shotenv.sensor import description_of
 from unwrap.signal import (
     GRAY_FULL_SCALE,
     SAMPLES_PER_FREQUENCY,
@@ -213,7 +213,7 @@ def _made_up(
     phase_rad = distance * (TWO_PI / unambiguous_range_m(sensor.f1_hz))
     strength = torch.sigmoid(2.0 * _clouds(count, size, generator) - 2.0)
     sensed = _made_up_samples(gray, phase_rad, strength, shots, generator)
-    described = describe(sensor)
+    described = description_of(sensor)
     return ExportFrames(
         f"{source}, {shots:d} samples each",
         sample_inputs(gray, sensed, described),

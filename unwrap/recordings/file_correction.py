@@ -12,7 +12,7 @@ from jsonargparse import ArgumentParser, Namespace
 from torch import Tensor
 
 from shotenv.config import SensorConfig, find_config, read_config
-from shotenv.sensor import describe
+from shotenv.sensor import description_of
 from unwrap.depth import Merge, correct
 from unwrap.networks import load_unwrapper
 from unwrap.recordings.arrays import read_arrays
@@ -128,7 +128,7 @@ def camera_of(
         A table that is missing, a field of view or a noise out of range.
     """
     config = read_config(SensorConfig, find_config("sensor", sensor))
-    description = describe(config)
+    description = description_of(config)
     if not 1 <= horizontal_fov_deg <= 179:
         raise ValueError(f"fov_deg is {horizontal_fov_deg:g}; expected 1 to 179 degrees")
     if wiggle is not None:

@@ -11,17 +11,13 @@ import pytest
 import torch
 
 from shotenv.bank import build as build_module
-from shotenv.bank.build import bank_folder as bank_folder_of, build_bank, clip_jobs
+from shotenv.bank.bank import MappedClips
+from shotenv.bank.build import build_bank
+from shotenv.bank.clip_jobs import clip_jobs
+from shotenv.bank.folders import bank_folder as bank_folder_of
+from shotenv.bank.layout import ARRAYS, BankError, frame_bytes
 from shotenv.bank.opening import open_bank
-from shotenv.bank.store import (
-    ARRAYS,
-    BankError,
-    frame_bytes,
-    read_clip_record,
-    verify,
-    write_clip,
-    write_manifest,
-)
+from shotenv.bank.store import read_clip_record, verify, write_clip, write_manifest
 from shotenv.config.bank import BankConfig
 from shotenv.config.families import FAMILIES, SHIFT_FAMILIES
 from shotenv.config.reader import ConfigError, find_config, merged, read_config
@@ -93,6 +89,18 @@ def test_frame_bytes_is_what_a_frame_takes(bank_folder):
     sizes = sum(path.stat().st_size for path in (bank_folder / "clips" / "c0").glob("*.npy"))
     header = 128 * len(ARRAYS)
     assert sizes == FRAMES * frame_bytes(HEIGHT, WIDTH) + header
+
+
+def test_only_so_many_clips_are_mapped_at_a_time(bank_folder):
+    folders = [bank_folder / "clips" / f"c{number}" for number in range(3)]
+    clips = MappedClips(folders, most=2)
+    first, second = clips[0], clips[1]
+    assert clips[0] is first and clips[1] is second and clips[0] is first
+    clips[2]  # closes the second, which is unused for longest
+    assert clips[0] is first
+    again = clips[1]
+    assert again is not second
+    assert all(torch.equal(again[name], second[name]) for name in ARRAYS)
 
 
 def test_pickle_opens_the_same_bank(bank_folder):
@@ -194,11 +202,46 @@ def damage_schema(folder):
     return "schema_version"
 
 
+def header_of(path) -> tuple[int, bytes]:
+    """Where the text of an array file's header begins, and the text."""
+    content = path.read_bytes()
+    length = int.from_bytes(content[8:10], "little")
+    return 10, content[10 : 10 + length]
+
+
+def write_header(path, text: bytes) -> None:
+    begin, before = header_of(path)
+    content = path.read_bytes()
+    padded = text.ljust(len(before) - 1)[: len(before) - 1] + b"\n"
+    path.write_bytes(content[:begin] + padded + content[begin + len(before) :])
+
+
+def damage_bracket(folder):
+    path = folder / "clips" / "c1" / "correlation.npy"
+    write_header(path, header_of(path)[1].replace(b")", b" "))
+    return "correlation.npy"
+
+
+def damage_keys(folder):
+    path = folder / "clips" / "c1" / "gray.npy"
+    write_header(path, b"{1: 2, 'shape': (3,)}")
+    return "gray.npy"
+
+
+def damage_brackets(folder):
+    path = folder / "clips" / "c1" / "gray.npy"
+    write_header(path, b"(" * 1000)
+    return "gray.npy"
+
+
 @pytest.mark.parametrize(
     "damage",
     [
         damage_truncate,
         damage_missing,
+        damage_bracket,
+        damage_brackets,
+        damage_keys,
         damage_pickle,
         damage_json,
         damage_traversal,
@@ -207,8 +250,29 @@ def damage_schema(folder):
 )
 def test_damaged_bank_is_refused_with_the_file_named(bank_folder, damage):
     name = damage(bank_folder)
-    with pytest.raises(BankError, match=name):
+    with pytest.raises(BankError, match=name) as refused:
         open_bank(bank_folder)
+    if name.endswith(".npy"):
+        assert "and render the bank again" in str(refused.value)
+
+
+@pytest.mark.filterwarnings("ignore:Reading `.npy`:UserWarning")
+def test_whatever_happens_to_a_header_the_bank_opens_or_names_the_file(bank_folder):
+    path = bank_folder / "clips" / "c1" / "active.npy"
+    begin, header = header_of(path)
+    sound, random = path.read_bytes(), np.random.default_rng(0)
+    refused = 0
+    for _ in range(600):
+        content = bytearray(sound)
+        for place in random.integers(0, begin + len(header.rstrip()), random.integers(1, 4)):
+            content[place] = random.choice(list(b"()[]{}'\",:0 \n\\#L\0\xff"))
+        path.write_bytes(content)
+        try:
+            open_bank(bank_folder)
+        except BankError as error:
+            assert "active.npy" in str(error)
+            refused += 1
+    assert refused > 500
 
 
 @pytest.mark.parametrize(

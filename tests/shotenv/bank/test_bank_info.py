@@ -10,17 +10,18 @@ import pytest
 from PIL import Image
 
 from agents.cli.entry import main
-from shotenv.bank.build import bank_folder, clip_jobs
-from shotenv.bank.listing import known_banks
-from shotenv.bank.opening import open_bank
-from shotenv.bank.overview import (
-    choose,
+from shotenv.bank.clip_jobs import clip_jobs
+from shotenv.bank.contact_sheets import (
     clips_by_family,
+    clips_shown,
     color_maps,
     contact_sheet,
-    quantities,
+    maps_of,
 )
-from shotenv.bank.store import BankError
+from shotenv.bank.contents import known_banks
+from shotenv.bank.folders import bank_folder
+from shotenv.bank.layout import BankError
+from shotenv.bank.opening import open_bank
 from shotenv.config.bank import BankConfig
 from shotenv.config.families import FAMILIES
 from shotenv.config.reader import find_config, read_config
@@ -96,14 +97,14 @@ def test_each_split_is_shown_before_a_second_clip_of_any(tiny_bank):
     families = clips_by_family(open_bank(tiny_bank))
     assert list(families) == list(FAMILIES)
     for clips in families.values():
-        assert [clip.split for clip in choose(clips, 3)] == ["train", "validation", "test"]
-        assert choose(clips, 100) == clips
+        assert [clip.split for clip in clips_shown(clips, 3)] == ["train", "validation", "test"]
+        assert clips_shown(clips, 100) == clips
 
 
 def test_the_true_distance_is_on_the_sheet_once_in_its_colours(tiny_bank):
     bank = open_bank(tiny_bank)
     pixels = np.asarray(contact_sheet(bank, clips=1))
-    distance_m = quantities(bank, bank.clips[0].frames // 2)["distance"]
+    distance_m = maps_of(bank, bank.clips[0].frames // 2)["distance"]
     colors = color_maps(bank.config.sensor)["distance"]
     near = np.clip(distance_m / colors.high * 254, 0, 254).round()
     expected = colors.palette[np.where(np.isfinite(distance_m), near, 255).astype(int)]
@@ -119,7 +120,7 @@ def test_quantities_agree_with_each_other(tiny_bank):
     sensor, still = bank.config.sensor, np.flatnonzero(bank.ego_speed_m_s == 0)
     index = int(still[0]) if len(still) else int(np.argmin(bank.ego_speed_m_s))
     moved_m = 8 * sensor.sample_period_s * float(bank.ego_speed_m_s[index]) * 0.1
-    found, wrap_m = quantities(bank, index), unambiguous_range_m(sensor.f1_hz)
+    found, wrap_m = maps_of(bank, index), unambiguous_range_m(sensor.f1_hz)
     lit = np.isfinite(found["wrapped distance"]) & np.isfinite(found["distance"])
     error = (found["wrapped distance"] - found["distance"] + wrap_m / 2) % wrap_m - wrap_m / 2
     wiggle_m = 0.09 * sensor.harmonic_strength * wrap_m / (2 * np.pi)  # 0.0711 rad if square

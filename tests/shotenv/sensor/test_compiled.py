@@ -9,7 +9,7 @@ import torch
 
 from shotenv.decision.measurement import sum_pixels_
 from shotenv.decision.score import score_pixels_
-from shotenv.sensor import pixels
+from shotenv.sensor import pixel_loops
 from unwrap.support.compiled import array, loop
 
 ROWS, COLUMNS = 5, 19
@@ -27,19 +27,19 @@ def light(draw):
     frames = (2, ROWS, COLUMNS)
     correlation = draw((2, 8, ROWS, COLUMNS), -0.6, 0.6)
     per_light = draw(2, 4e4, 6e4), draw(2, 1e5, 2e5)
-    return pixels.Light(correlation, draw(frames), draw(frames), *per_light)
+    return pixel_loops.IncidentLight(correlation, draw(frames), draw(frames), *per_light)
 
 
 @pytest.fixture
 def pixel():
-    return pixels.Pixel(*map(np.float32, (0.8, 83.0**2, 6e4, 0.0128, 5e-5, -2048, 2047)))
+    return pixel_loops.Pixel(*map(np.float32, (0.8, 83.0**2, 6e4, 0.0128, 5e-5, -2048, 2047)))
 
 
 def test_a_sample_is_that_of_the_python_loop_to_the_last_bit(light, pixel, draw):
     normals = draw((2, 2, ROWS, COLUMNS), -3.0, 3.0)
     pattern_lsb = draw((2, ROWS, COLUMNS), -20.0, 20.0)
     found = []
-    for take in (pixels.take_sample, pixels.take_sample.py_func):
+    for take in (pixel_loops.take_sample_, pixel_loops.take_sample_.py_func):
         words = np.zeros((2, 2, ROWS, COLUMNS), np.float32)
         saturated = np.zeros((2, ROWS, COLUMNS), bool)
         take(1, light, normals, pattern_lsb, pixel, words, saturated)
@@ -49,24 +49,26 @@ def test_a_sample_is_that_of_the_python_loop_to_the_last_bit(light, pixel, draw)
     assert 0 < saturated.mean() < 1 and words[:, 1].std() > 10 and not words[:, 0].any()
 
 
-def test_strong_pixels_and_noise_are_those_of_the_python_loop(light, pixel, draw):
+def test_scored_pixels_and_noise_are_those_of_the_python_loop(light, pixel, draw):
     truth_m = draw((2, ROWS, COLUMNS), 0.0, 40.0)
     limits = np.float32(25.0), np.float32(100.0)
     found = [np.zeros((2, ROWS, COLUMNS), bool) for _ in range(2)]
-    pixels.strong_pixels(light, pixel, truth_m, *limits, found[0])
-    pixels.strong_pixels.py_func(light, pixel, truth_m, *limits, found[1])
+    pixel_loops.mark_scored_(light, pixel, truth_m, *limits, found[0])
+    pixel_loops.mark_scored_.py_func(light, pixel, truth_m, *limits, found[1])
     assert np.array_equal(*found) and 0.1 < found[0].mean() < 0.9
     gray, per_word = (4095 * draw((2, ROWS, COLUMNS))).astype(np.uint16), draw(2)
     noise = [np.empty_like(truth_m) for _ in range(2)]
-    pixels.noise_by_gray(gray, per_word, np.float32(3.0), noise[0])
-    pixels.noise_by_gray.py_func(gray, per_word, np.float32(3.0), noise[1])
+    pixel_loops.noise_by_gray_(gray, per_word, np.float32(3.0), noise[0])
+    pixel_loops.noise_by_gray_.py_func(gray, per_word, np.float32(3.0), noise[1])
     assert np.array_equal(*noise)
 
 
 def test_gray_words_are_those_of_the_python_loop(pixel, draw):
     light, normals = draw((2, ROWS, COLUMNS)), draw((2, ROWS, COLUMNS), -3.0, 3.0)
     words = [np.zeros((2, ROWS, COLUMNS), np.int32) for _ in range(2)]
-    for take, into in zip((pixels.take_gray, pixels.take_gray.py_func), words, strict=True):
+    for take, into in zip(
+        (pixel_loops.take_gray_, pixel_loops.take_gray_.py_func), words, strict=True
+    ):
         take(light, np.float32([2e4, 1e5]), normals, pixel._replace(low_lsb=np.float32(0)), into)
     assert np.array_equal(*words) and words[0].std() > 10
 

@@ -8,13 +8,13 @@ import pytest
 import torch
 
 from shotenv.config.reader import merged
-from shotenv.sensor.acquisition import expose, light_of, scored_pixels, sensitivity
+from shotenv.sensor.acquisition import expose, incident_light, scored_pixels, sensitivity
 from shotenv.sensor.electrons import electrons_per_radiance_second
 from shotenv.sensor.exposure import Exposure
 from shotenv.sensor.gray import capture_gray, sample_noise_lsb
 from shotenv.sensor.noise import Purpose, draw_noise, stream, stream_seed
 from shotenv.sensor.offsets import OffsetPattern, draw_offsets
-from shotenv.sensor.pixels import word_lsb
+from shotenv.sensor.pixel_loops import word_lsb
 from unwrap.signal.shots import Shots, demodulation_phase_rad, frequency_index
 
 C_M_S = 299_792_458.0
@@ -96,7 +96,8 @@ def test_one_sensor_serves_a_batch_of_frames(sensor):
         noise_free(three, sensor, offsets=two, batch=3)
     with pytest.raises(RuntimeError, match="expand"):
         capture_gray(three.ambient, sensor, noise=torch.zeros_like(three.ambient[:2]))
-    light = light_of(three, sensitivity(sensor, torch.full((3,), 7.0), torch.full((3,), 6e-4)))
+    per_light = sensitivity(sensor, torch.full((3,), 7.0), torch.full((3,), 6e-4))
+    light = incident_light(three, per_light)
     with pytest.raises(ValueError, match=r"truth_m is \(1, "):
         scored_pixels(light, one.distance_m, sensor)
     gray, exposure_s = capture_gray(three.ambient, sensor, noise=None)

@@ -13,7 +13,7 @@ import torch
 from agents.cli.entry import main
 from shotenv.bank.opening import open_bank
 from shotenv.config.keywords import env_config
-from shotenv.sensor.description import describe
+from shotenv.sensor.description import description_of
 from unwrap.depth.correction import correct_sensed
 from unwrap.depth.merge import merge_nearest, merge_segmentation
 from unwrap.export import check as exporting
@@ -201,7 +201,7 @@ def test_the_pages_example_runs(capsys, monkeypatch, tmp_path, fused):
 
 @pytest.mark.parametrize("shots", [2, 4])
 def test_samples_become_what_the_unwrapper_and_the_correction_make_of_them(fused, sensor, shots):
-    inputs, description = samples(shots), describe(sensor)
+    inputs, description = samples(shots), description_of(sensor)
     found, sensed = run(fused / f"{shots}.onnx", **inputs), sensed_of(inputs)
     looked = load_unwrapper(fused / f"{shots}.safetensors").predict_sensed(sensed, description)
     merge = "none" if shots == 2 else "nearest"
@@ -231,7 +231,7 @@ def test_samples_become_what_the_unwrapper_and_the_correction_make_of_them(fused
 )
 def test_peers_that_look_at_samples_serve_as_well(tmp_path, sensor, name):
     unwrapper = load_unwrapper(write_samples_network(tmp_path / "peer.safetensors", name))
-    network = exported(unwrapper, describe(sensor), "nearest")
+    network = exported(unwrapper, description_of(sensor), "nearest")
     frames = export_frames(None, "test", 2, (HEIGHT, WIDTH), env_config(), Shots.TWO)
     content = to_onnx(network, frames.one_by_one()[0], {})
     found, expected = run_content(content, frames), run_torch(network, frames)

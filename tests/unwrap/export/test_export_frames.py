@@ -3,8 +3,8 @@
 import pytest
 import torch
 
+from shotenv.bank.layout import BankError
 from shotenv.bank.opening import open_bank
-from shotenv.bank.store import BankError
 from shotenv.config.keywords import env_config
 from unwrap.export.export_frames import choose_bank, export_frames
 from unwrap.signal.shots import Shots

@@ -10,8 +10,8 @@ import numpy as np
 import torch
 from PIL import Image
 
-from shotenv.bank.frames_reader import Bank, Clip
-from shotenv.bank.store import BankError
+from shotenv.bank.bank import Bank, Clip
+from shotenv.bank.layout import BankError
 from shotenv.config import SensorConfig
 from shotenv.sensor import full_scale_lsb
 from unwrap.pictures import (
@@ -38,6 +38,7 @@ from unwrap.signal import SAMPLES_PER_FREQUENCY, decode, distance_m, unambiguous
 
 CLIPS_PER_FAMILY = 3
 AMPLITUDE_DECADES = (-5.0, 0.0)
+"""Of log10 of the amplitude: a dark wall at 25 m to a bright one at hand."""
 
 
 def contact_sheet(bank: Bank, *, clips: int = CLIPS_PER_FAMILY) -> Image.Image:
@@ -60,9 +61,20 @@ def contact_sheet(bank: Bank, *, clips: int = CLIPS_PER_FAMILY) -> Image.Image:
     if bank.config is None:
         raise BankError(f"bank {bank.folder} was imported: nothing tells its frequencies")
     maps, scale = color_maps(bank.config.sensor), max(1, bank.width // NARROWEST_TILE_PX)
-    rows = [_row(bank, of, clips, maps, scale) for of in clips_by_family(bank).values()]
-    legend = _legend(maps, max(row.width for row in rows), scale)
-    return framed(column([_title(bank, scale), *rows, legend], gap=2 * GAP_PX * scale))
+    title = [
+        text(
+            f"{bank.manifest.name}: {len(bank)} frames of {bank.width} x {bank.height} pixels in "
+            f"{len(bank.clips)} clips",
+            scale * LARGE_PX,
+        ),
+        text("light gray: sky, or no laser light comes back", scale * SMALL_PX, FAINT),
+    ]
+    rows = [_row(bank, kin, clips, maps, scale) for kin in clips_by_family(bank).values()]
+    # The colour bars share the whole width, with a gap between them.
+    width = max(row.width for row in rows)
+    each = (width - (len(maps) - 1) * 2 * MARGIN_PX) // len(maps)
+    legend = line([bar(name, maps[name], each, scale) for name in maps], gap=2 * MARGIN_PX)
+    return framed(column([line(title), *rows, legend], gap=2 * GAP_PX * scale))
 
 
 def color_maps(sensor: SensorConfig) -> dict[str, ColorMap]:
@@ -84,9 +96,10 @@ def clips_by_family(bank: Bank) -> dict[str, list[Clip]]:
     return families
 
 
-def quantities(bank: Bank, index: int) -> dict[str, np.ndarray]:
-    """What `color_maps` colours, of the frame `index`: each float [H, W]."""
+def maps_of(bank: Bank, index: int) -> dict[str, np.ndarray]:
+    """Pictures of frame `index` before they are coloured, each float [H, W]; see `color_maps`."""
     frame, sensor = bank.frame(index), bank.config.sensor
+    # Noise-free light in place of samples: phase and amplitude are decoded from it just so.
     first = decode(frame.exposure.correlation[0, :SAMPLES_PER_FREQUENCY])
     lit = first.amplitude > 0
     wrapped_m = torch.where(lit, distance_m(first.phase_rad, sensor.f1_hz), torch.nan)
@@ -98,31 +111,28 @@ def quantities(bank: Bank, index: int) -> dict[str, np.ndarray]:
     }
 
 
-def choose(clips: Sequence[Clip], count: int) -> list[Clip]:
-    """`count` clips of one family: the first of each of its splits, then the second of each, ..."""
+def clips_shown(clips: Sequence[Clip], count: int) -> list[Clip]:
+    """At most `count` of the clips of one family, in their order.
+
+    The first of each of its splits, then the second of each, and so on: of five clips for training,
+    two for validation and one for testing, three are one of each.
+    """
     splits = [[c for c in clips if c.split == split] for split in Counter(c.split for c in clips)]
     in_turn = [clip for turn in zip_longest(*splits) for clip in turn if clip is not None]
     return sorted(in_turn[:count], key=lambda clip: clip.start)
 
 
-def _title(bank: Bank, scale: int) -> Image.Image:
-    name, size = bank.manifest.name, f"{bank.width} x {bank.height}"
-    words = f"{name}: {len(bank)} frames of {size} pixels in {len(bank.clips)} clips"
-    note = "light gray: sky, or no laser light comes back"
-    return line([text(words, scale * LARGE_PX), text(note, scale * SMALL_PX, FAINT)])
-
-
 def _row(
-    bank: Bank, of: Sequence[Clip], count: int, maps: dict[str, ColorMap], scale: int
+    bank: Bank, kin: Sequence[Clip], count: int, maps: dict[str, ColorMap], scale: int
 ) -> Image.Image:
-    """Heading and pictures of one family."""
-    shares = Counter(clip.split for clip in of)
+    """Heading and pictures of one family, whose clips are `kin`."""
+    shares = Counter(clip.split for clip in kin)
     told = ", ".join(f"{number} {split}" for split, number in shares.items())
     heading = [
-        text(of[0].family, scale * LARGE_PX),
+        text(kin[0].family, scale * LARGE_PX),
         text(f"{told} clips", scale * SMALL_PX, FAINT),
     ]
-    blocks = [_block(bank, clip, maps, scale) for clip in choose(of, count)]
+    blocks = [_block(bank, clip, maps, scale) for clip in clips_shown(kin, count)]
     return column([line(heading), line(blocks, gap=MARGIN_PX)])
 
 
@@ -135,13 +145,6 @@ def _block(bank: Bank, clip: Clip, maps: dict[str, ColorMap], scale: int) -> Ima
         f"{clip.split}   seed {clip.seed}   frame {middle + 1} of {clip.frames}   "
         f"{speed_m_s:.1f} m/s   gray {1e3 * exposure_s:.2g} ms"
     )
-    found = quantities(bank, index)
+    found = maps_of(bank, index)
     tiles = [enlarged(paint(found[name], colors)) for name, colors in maps.items()]
     return column([text(caption, scale * SMALL_PX, FAINT), line(tiles)])
-
-
-def _legend(maps: dict[str, ColorMap], width: int, scale: int) -> Image.Image:
-    """A colour bar for each picture, over the whole width."""
-    each = (width - (len(maps) - 1) * 2 * MARGIN_PX) // len(maps)
-    bars = [bar(name, colors, each, scale) for name, colors in maps.items()]
-    return line(bars, gap=2 * MARGIN_PX)

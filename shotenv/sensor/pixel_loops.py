@@ -1,7 +1,8 @@
 """What happens to light in a pixel, effect by effect, and the loops over pixels that compose them.
 
 Each effect is a function of numbers; a parameter at zero (or an infinite full well) switches it
-off. Electrons are counted over both taps unless a tap is named.
+off. Electrons are counted over both taps unless a tap is named. Numbers are float32 throughout,
+constants too: one Python float would make the arithmetic float64 (see `unwrap.support.loop`).
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ Array = np.ndarray
 HALF, ZERO = np.float32(0.5), np.float32(0.0)
 
 
-class Light(NamedTuple):
+class IncidentLight(NamedTuple):
     """Noise-free light of B frames, and what it is worth in electrons of one sample, float32.
 
     Attributes
@@ -96,9 +97,9 @@ def ambient_offset_lsb(ambient_e, full_well_e, lsb_per_e):
 
 
 @loop
-def take_sample(
+def take_sample_(
     number: int,
-    light: Light,
+    light: IncidentLight,
     normals: Array,
     pattern_lsb: Array,
     pixel: Pixel,
@@ -122,10 +123,13 @@ def take_sample(
     saturated : bool [B, H, W]
         Becomes true where a tap is full or the word at a limit of its range.
     """
+    # Packets carry the variance of reading them; it cancels in the difference of two taps, and
+    # the full well is raised by as much.
     full_e = pixel.full_well_e + pixel.read_variance_e
     frames, rows, columns = saturated.shape
     for b in range(frames):
         active_e, ambient_e = light.active_e[b], light.ambient_e[b]
+        # Half of the contrast in each tap: what one gains the other loses.
         swing_e = HALF * pixel.contrast * active_e
         for i in range(rows):
             parity = pixel.ambient_lsb_per_e if i % 2 == 0 else -pixel.ambient_lsb_per_e
@@ -147,6 +151,7 @@ def take_sample(
                     offset_lsb + pixel.gain_lsb_per_e * held_e, pixel.low_lsb, pixel.high_lsb
                 )
                 words[j] = word
+                # The lowest and the highest word report overflow, as those of real imagers do.
                 full[j] = full[j] | (
                     (a_e >= full_e)
                     | (b_e >= full_e)
@@ -156,7 +161,7 @@ def take_sample(
 
 
 @loop
-def take_gray(
+def take_gray_(
     ambient: Array, per_light_e: Array, normals: Array, pixel: Pixel, words: Array
 ) -> None:
     """Gray words of B frames: one tap, noise, full well, converter.
@@ -175,6 +180,7 @@ def take_gray(
             for j in range(columns):
                 charge_e = ambient[b, i, j] * per_light_e[b]
                 read_e = noisy_e(packet_e(charge_e, pixel.read_variance_e), normals[b, i, j])
+                # No second tap cancels the variance that the packet carries.
                 held_e = min(read_e - pixel.read_variance_e, pixel.full_well_e)
                 words[b, i, j] = word_lsb(
                     held_e * pixel.gain_lsb_per_e, pixel.low_lsb, pixel.high_lsb
@@ -182,8 +188,13 @@ def take_gray(
 
 
 @loop
-def strong_pixels(
-    light: Light, pixel: Pixel, truth_m: Array, range_m: np.float32, snr: np.float32, strong: Array
+def mark_scored_(
+    light: IncidentLight,
+    pixel: Pixel,
+    truth_m: Array,
+    range_m: np.float32,
+    snr: np.float32,
+    scored: Array,
 ) -> None:
     """Where truth lies within a range and one sample's noise-free signal to noise is above `snr`.
 
@@ -192,11 +203,12 @@ def strong_pixels(
     Parameters
     ----------
     truth_m : float32 [B, H, W]
-    strong : bool [B, H, W]
+    scored : bool [B, H, W]
         Is written.
     """
+    # Of both taps, whose difference the sample is.
     both_e = pixel.read_variance_e + pixel.read_variance_e
-    frames, rows, columns = strong.shape
+    frames, rows, columns = scored.shape
     for b in range(frames):
         for i in range(rows):
             for j in range(columns):
@@ -204,11 +216,11 @@ def strong_pixels(
                 ambient_e = light.ambient[b, i, j] * light.ambient_e[b]
                 noise_e = np.sqrt(active_e + ambient_e + both_e)
                 above = pixel.contrast * active_e > snr * noise_e
-                strong[b, i, j] = above & (truth_m[b, i, j] <= range_m)
+                scored[b, i, j] = above & (truth_m[b, i, j] <= range_m)
 
 
 @loop
-def noise_by_gray(gray: Array, variance_per_word: Array, dark: np.float32, noise: Array) -> None:
+def noise_by_gray_(gray: Array, variance_per_word: Array, dark: np.float32, noise: Array) -> None:
     """Noise of a sample in the light that a gray image shows.
 
     Parameters

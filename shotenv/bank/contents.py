@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from shotenv.bank.build import bank_bytes, bank_folder, clips_standing, rendering_minutes
-from shotenv.bank.frames_reader import Bank
-from shotenv.bank.store import MANIFEST, frame_bytes
+from shotenv.bank.bank import Bank
+from shotenv.bank.build import bank_bytes, clips_standing, rendering_minutes
+from shotenv.bank.folders import bank_folder
+from shotenv.bank.layout import MANIFEST, frame_bytes
 from shotenv.config import BankConfig, configs_dir, read_config
 
 
@@ -17,6 +18,7 @@ def known_banks() -> list[dict[str, Any]]:
 
 
 def _planned(config: BankConfig) -> dict[str, Any]:
+    """Size of the bank of `config`, standing or not, and how far its rendering has come."""
     standing, clips = clips_standing(config)
     frames = clips * config.world.frames_per_clip
     missing = (clips - standing) * config.world.frames_per_clip
@@ -29,6 +31,7 @@ def _planned(config: BankConfig) -> dict[str, Any]:
         "bytes": bank_bytes(config, frames),
         "clips": clips,
         "clips_standing": standing,
+        # Clips that stand without a manifest are a rendering that goes on, or was cut off.
         "rendered": standing == clips and (folder / MANIFEST).is_file(),
         "minutes_left": rendering_minutes(config, missing) if missing else 0.0,
         "folder": str(folder),
@@ -53,7 +56,7 @@ def _state(bank: dict[str, Any]) -> str:
     return f"{state}, about {bank['minutes_left']:.0f} minutes to render"
 
 
-def describe_bank(bank: Bank) -> dict[str, Any]:
+def contents_of(bank: Bank) -> dict[str, Any]:
     """Size, frames of each family in each split, and the configuration of `bank`."""
     splits: dict[str, dict[str, int]] = {}
     for clip in bank.clips:
@@ -73,8 +76,8 @@ def describe_bank(bank: Bank) -> dict[str, Any]:
     }
 
 
-def print_bank(about: dict[str, Any]) -> None:
-    """What `describe_bank` found."""
+def print_contents(about: dict[str, Any]) -> None:
+    """The `contents_of` a bank, as words and a table."""
     print(
         f"{about['name']}: {about['frames']} frames of {_pixels(about)} pixels in "
         f"{about['clips']} clips, {_gigabytes(about['bytes'])}"

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
+from threading import Lock
 from typing import Literal
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from shotenv.bank.store import ARRAYS, BankError, Manifest, read_manifest
+from shotenv.bank.layout import ARRAYS, BankError, Manifest
+from shotenv.bank.store import read_manifest
 from shotenv.config import Split
 from shotenv.sensor import Exposure
 from unwrap.training import RANDOM_SPLITS, random_split
 
 OPEN_CLIPS = 128
-"""Clips kept mapped at a time; each holds one file descriptor per array."""
+"""Clips of a bank that are mapped at a time: with five arrays each, 640 of the usual 1024 files."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,44 @@ class BankFrame:
     gray_exposure_s: float
 
 
+class MappedClips:
+    """Arrays of a bank's clips, memory-mapped when asked for; the longest unused are closed.
+
+    Every mapped array holds a file descriptor, and a bank may have more of them than a process may
+    open. Threads may share it.
+
+    Parameters
+    ----------
+    folders
+        Of the clips, in their order.
+    most
+        Clips mapped at a time.
+    """
+
+    def __init__(self, folders: Sequence[Path], most: int = OPEN_CLIPS) -> None:
+        self._folders, self._most = tuple(folders), most
+        self._mapped: OrderedDict[int, dict[str, Tensor]] = OrderedDict()
+        self._lock = Lock()
+
+    def __getitem__(self, clip: int) -> dict[str, Tensor]:
+        """Arrays of clip number `clip` by name, frames first."""
+        with self._lock:
+            if clip not in self._mapped:
+                self._mapped[clip] = self._map(self._folders[clip])
+                if len(self._mapped) > self._most:
+                    self._mapped.popitem(last=False)
+            self._mapped.move_to_end(clip)  # The one unused for longest comes first.
+            return self._mapped[clip]
+
+    @staticmethod
+    def _map(folder: Path) -> dict[str, Tensor]:
+        # Copy-on-write: torch wants a writable array, and the file is never written to.
+        arrays = {
+            n: np.load(folder / f"{n}.npy", mmap_mode="c", allow_pickle=False) for n in ARRAYS
+        }
+        return {name: torch.from_numpy(array) for name, array in arrays.items()}
+
+
 class Bank:
     """Frames of many clips, indexed 0..len-1, clip after clip.
 
@@ -71,15 +111,21 @@ class Bank:
     def __init__(self, folder: Path) -> None:
         self.folder = Path(folder).resolve()
         self.manifest: Manifest = read_manifest(self.folder)
-        self.clips = _clips(self.manifest)
+        starts = np.cumsum([0] + [clip.frames for clip in self.manifest.clips]).tolist()
+        self.clips = tuple(
+            Clip(c.name, c.family, c.seed, c.split, start, c.frames)
+            for c, start in zip(self.manifest.clips, starts, strict=False)
+        )
+        # For each frame of the bank the number of its clip.
         self._clip_of_frame = np.repeat(np.arange(len(self.clips)), [c.frames for c in self.clips])
-        self._map = lru_cache(maxsize=OPEN_CLIPS)(self._map_clip)
+        self._arrays = MappedClips([self.folder / clip.folder for clip in self.manifest.clips])
         self.time_s = self._per_frame("time_s")
         self.ego_speed_m_s = self._per_frame("ego_speed_m_s")
         self.yaw_rate_rad_s = self._per_frame("yaw_rate_rad_s")
         self.gray_exposure_s = self._per_frame("gray_exposure_s")
 
     def __reduce__(self):
+        # Another process maps the files for itself.
         return (type(self), (self.folder,))
 
     def __len__(self) -> int:
@@ -180,22 +226,13 @@ class Bank:
         return self._gather("gray", indices.tolist())
 
     def _gather(self, name: str, indices: Sequence[int]) -> Tensor:
-        frames = [self._frame_array(name, index) for index in indices]
+        """Array `name` of the frames `indices`, stacked; a single one is a view of the file."""
+        clips = [int(self._clip_of_frame[index]) for index in indices]
+        frames = [
+            self._arrays[clip][name].narrow(0, index - self.clips[clip].start, 1)
+            for clip, index in zip(clips, indices, strict=True)
+        ]
         return frames[0] if len(frames) == 1 else torch.cat(frames)
-
-    def _frame_array(self, name: str, index: int) -> Tensor:
-        clip = int(self._clip_of_frame[index])
-        return self._map(clip)[name].narrow(0, index - self.clips[clip].start, 1)
-
-    def _map_clip(self, clip: int) -> dict[str, Tensor]:
-        folder = self.folder / self.manifest.clips[clip].folder
-        # Copy-on-write: torch wants a writable array, and the file is never written to.
-        return {
-            name: torch.from_numpy(
-                np.load(folder / f"{name}.npy", mmap_mode="c", allow_pickle=False)
-            )
-            for name in ARRAYS
-        }
 
     def _per_frame(self, field: str) -> np.ndarray:
         return np.concatenate([np.asarray(getattr(clip, field)) for clip in self.manifest.clips])
@@ -208,11 +245,3 @@ class Bank:
 
 def _indices(clips: tuple[Clip, ...]) -> Tensor:
     return torch.cat([torch.arange(clip.start, clip.start + clip.frames) for clip in clips])
-
-
-def _clips(manifest: Manifest) -> tuple[Clip, ...]:
-    starts = np.cumsum([0] + [clip.frames for clip in manifest.clips]).tolist()
-    return tuple(
-        Clip(c.name, c.family, c.seed, c.split, start, c.frames)
-        for c, start in zip(manifest.clips, starts, strict=False)
-    )

@@ -1,0 +1,81 @@
+"""One clip from its seed: world, light of every frame, gray images. Runs in a worker process."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from shotenv.bank.clip_jobs import ClipJob
+from shotenv.bank.layout import ARRAYS
+from shotenv.bank.store import write_clip
+from shotenv.config import BankConfig
+from shotenv.render import FrameRenderer, RenderedFrame
+from shotenv.sensor import capture_gray, gray_exposure_s
+from shotenv.world import draw_world
+from shotenv.world.geometry import World
+
+METER_REDUCTION = 4
+"""The light meter sees one pixel where the camera sees so many each way."""
+
+GRAY_NOISE = -1
+"""Number, among those of the frames, that seeds the noise of a clip's gray images."""
+
+
+def render_clip(job: ClipJob) -> str:
+    """Render one clip and write it; returns its name."""
+    config = job.config
+    world = draw_world(job.family, job.seed, config.world)
+    times = np.arange(config.world.frames_per_clip) / config.world.frame_rate_hz
+    rendered = _render_frames(world, times, config, job.seed)
+    light = {
+        name: np.stack([getattr(frame, name) for frame in rendered])
+        for name in ARRAYS
+        if name != "gray"
+    }
+    # The noise of the gray image belongs to the bank: what networks make of it is then the same in
+    # every drive, and can be kept.
+    generator = torch.Generator().manual_seed(_seed(job.seed, GRAY_NOISE))
+    noise = torch.randn(light["ambient"].shape, generator=generator)
+    gray, exposure_s = capture_gray(torch.from_numpy(light["ambient"]), config.sensor, noise=noise)
+    # Speed and yaw rate do not change within a clip, but a recording's may: one value per frame.
+    constant = np.ones(len(times))
+    metadata = {
+        "name": job.name,
+        "family": job.family,
+        "seed": job.seed,
+        "split": job.split,
+        "time_s": times.tolist(),
+        "ego_speed_m_s": (constant * world.ego.speed_m_s).tolist(),
+        "yaw_rate_rad_s": (constant * world.ego.yaw_rate_rad_s).tolist(),
+        "gray_exposure_s": exposure_s.tolist(),
+    }
+    write_clip(job.folder, {**light, "gray": gray.numpy().astype(np.uint16)}, metadata)
+    return job.name
+
+
+def _render_frames(
+    world: World, times: np.ndarray, config: BankConfig, seed: int
+) -> list[RenderedFrame]:
+    """Frames of a clip; motion blurs gray for as long as the frame before called for.
+
+    Before the first frame comes a coarse look, as a light meter takes it.
+    """
+    camera, sensor = config.camera, config.sensor
+    coarse = {"width": camera.width // METER_REDUCTION, "height": camera.height // METER_REDUCTION}
+    meter = camera.model_copy(update=coarse)
+    renderer = FrameRenderer(world, sensor)
+    # The meter's look has a seed of its own, as if it were one frame more.
+    frames = [renderer.frame(float(times[0]), meter, seed=_seed(seed, len(times)))]
+    for number, time in enumerate(times):
+        light = torch.from_numpy(frames[-1].ambient).unsqueeze(0)
+        exposure_s = float(gray_exposure_s(light, sensor))
+        frame_seed = _seed(seed, number)
+        frames.append(
+            renderer.frame(float(time), camera, seed=frame_seed, gray_exposure_s=exposure_s)
+        )
+    return frames[1:]
+
+
+def _seed(clip_seed: int, number: int) -> int:
+    """A 32-bit seed of its own for each frame of each clip."""
+    return int(np.random.SeedSequence([clip_seed, number + 1]).generate_state(1)[0])

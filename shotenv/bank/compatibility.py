@@ -1,0 +1,51 @@
+"""Whether a sensor and a frame rate are those that a bank was made for."""
+
+from __future__ import annotations
+
+from shotenv.bank.bank import Bank
+from shotenv.config import ACQUISITION_FIELDS, SensorConfig
+
+BAKED_FIELDS = tuple(
+    field
+    for field in SensorConfig.model_fields
+    if field not in ACQUISITION_FIELDS and field != "name"
+)
+"""Fields of the sensor that the light or the gray images of a bank were made with.
+
+Of the light: frequencies, timing, overtones, and the exposure that blurs ambient light. Of the gray
+images, which the laser has no part in: everything from the lens to the converter. The name alone
+is compared by nobody.
+"""
+
+
+def check_fits(bank: Bank, sensor: SensorConfig, *, frame_rate_hz: float | None = None) -> None:
+    """Refuse a sensor or a frame rate that is not the one the bank was rendered for.
+
+    Fields that are applied when a frame is acquired (`shotenv.config.ACQUISITION_FIELDS`) may have
+    any value. An imported bank does not tell what it was made with, and fits everything.
+
+    Parameters
+    ----------
+    frame_rate_hz
+        Frames per second where frames are played in their order; None where each stands alone.
+
+    Raises
+    ------
+    ValueError
+        Names the field, both values and the cure.
+    """
+    if bank.config is None:
+        return
+    for field in BAKED_FIELDS:
+        rendered, wanted = getattr(bank.config.sensor, field), getattr(sensor, field)
+        if rendered != wanted:
+            raise ValueError(
+                f"sensor.{field} is {wanted:g}, but bank {bank.config.name} was rendered with "
+                f"{rendered:g}; render a bank with this sensor"
+            )
+    rendered_hz = bank.config.world.frame_rate_hz
+    if frame_rate_hz not in (None, rendered_hz):
+        raise ValueError(
+            f"frame_rate_hz is {frame_rate_hz:g}, but bank {bank.config.name} was rendered at "
+            f"{rendered_hz:g}; ask for that, or render a bank at this frame rate"
+        )

@@ -1,0 +1,48 @@
+"""Which folder a bank lies in, and which configuration a folder was rendered from."""
+
+from __future__ import annotations
+
+import json
+import os
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from shotenv.config import ACQUISITION_FIELDS, BankConfig
+
+RENDERING_VERSION = 3
+"""Raised when the same configuration would give other light: old banks are then left alone."""
+
+SOURCE = "source.json"
+"""File in a bank's folder with the `identity` it is rendered from, written before any clip."""
+
+
+def cache_dir() -> Path:
+    """Folder of rendered banks and kept predictions: SHOTENV_CACHE, or the user's cache folder."""
+    import platformdirs
+
+    return Path(os.environ.get("SHOTENV_CACHE") or platformdirs.user_cache_path("shotenv"))
+
+
+def bank_folder(config: BankConfig) -> Path:
+    """Where the bank of `config` lies; a bank of another `identity` lies elsewhere.
+
+    Examples
+    --------
+    >>> bank_folder(starter).name                                       # doctest: +SKIP
+    'starter-5ea61398'
+    """
+    content = json.dumps(identity(config), sort_keys=True)
+    return cache_dir() / "banks" / f"{config.name}-{sha256(content.encode()).hexdigest()[:8]}"
+
+
+def identity(config: BankConfig) -> dict[str, Any]:
+    """Everything that the bank's content depends on, as JSON: all but `ACQUISITION_FIELDS`."""
+    content = config.model_dump(mode="json", exclude={"sensor": set(ACQUISITION_FIELDS)})
+    return {"rendering_version": RENDERING_VERSION, "config": content}
+
+
+def was_rendered_from(folder: Path, config: BankConfig) -> bool:
+    """Whether the bank in `folder`, finished or not, is that of `config`."""
+    path = folder / SOURCE
+    return path.is_file() and json.loads(path.read_text()) == identity(config)

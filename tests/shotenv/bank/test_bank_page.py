@@ -1,0 +1,52 @@
+"""The page on banks: its numbers are those of the configurations."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from shotenv.bank.contents import known_banks
+from shotenv.config.bank import BankConfig
+from shotenv.config.families import FAMILIES, SHIFT_FAMILIES
+from shotenv.config.reader import find_config, read_config
+
+TEXT = (Path(__file__).parents[3] / "docs" / "bank.md").read_text(encoding="utf-8")
+ROWS = dict(re.findall(r"^(\| `(\w+)` \| \d.*)$", TEXT.partition("## Banks that come")[2], re.M))
+BANKS = {bank["name"]: bank for bank in known_banks()}
+
+
+def row_of(name: str) -> str:
+    """The row of the table that the configuration `name` calls for."""
+    config, bank = read_config(BankConfig, find_config("bank", name)), BANKS[name]
+    world, clips = config.world, {split: count for split, (count, _) in config.clips.items()}
+    frames = {
+        split: count * len(families) * world.frames_per_clip
+        for split, (count, families) in config.clips.items()
+    }
+    assert sum(frames.values()) == bank["frames"]
+    cells = [
+        f"`{name}`",
+        str(bank["frames"]),
+        f"{bank['width']} x {bank['height']}",
+        "{train}, {validation}, {test}; {shift}".format(**clips),
+        f"{world.frames_per_clip} at {world.frame_rate_hz:g} Hz",
+        "{train}, {validation}, {test}; {shift}".format(**frames),
+        f"{bank['bytes'] / 1e9:.1f} GB",
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+def test_every_bank_that_comes_along_has_a_row_and_no_other():
+    assert sorted(ROWS.values()) == sorted(BANKS)
+
+
+@pytest.mark.parametrize("name", BANKS)
+def test_the_row_of_a_bank_says_what_its_configuration_gives(name):
+    assert row_of(name) in ROWS
+
+
+def test_the_families_are_as_many_as_the_page_says():
+    assert "of each of five families; shift of each of four" in TEXT
+    assert (len(FAMILIES), len(SHIFT_FAMILIES)) == (5, 4)
