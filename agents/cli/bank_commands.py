@@ -53,8 +53,8 @@ def tell_about_banks(arguments: Namespace) -> int:
         contents_of,
         known_banks,
         open_bank,
-        print_contents,
         print_banks,
+        print_contents,
     )
 
     if arguments.bank is None:

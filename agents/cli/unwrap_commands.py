@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from jsonargparse import ArgumentParser, Namespace
 
@@ -22,6 +23,7 @@ def train_arguments(parser: ArgumentParser) -> None:
     """Configuration of the training, and where the weights go."""
     from unwrap.training import TrainConfig
 
+    # Not `add_config`: there is no file of defaults, which are the fields' own.
     parser.add_argument("--config", action="config", help="YAML file over the defaults")
     parser.add_class_arguments(TrainConfig, None, sub_configs=True)
     add_out(parser, "runs/unwrap", "folder of the weights and the checkpoint")
@@ -47,6 +49,7 @@ def evaluate_arguments(parser: ArgumentParser) -> None:
 
 def evaluate_network(arguments: Namespace) -> int:
     """Measure an unwrapping network."""
+    from shotenv.bank import open_bank
     from shotenv.config import env_config
     from shotenv.dataset import measure_unwrapping, print_unwrapping
     from shotenv.decision import open_problem
@@ -54,6 +57,9 @@ def evaluate_network(arguments: Namespace) -> int:
 
     load_unwrapper(arguments.unwrapper)  # refused before a bank is rendered for it
     chosen = {name: arguments[name] for name in ("bank", "unwrapper", "split")}
+    # Every frame stands alone here: a bank of any frame rate will do.
+    if (rendered := open_bank(arguments.bank).config) is not None:
+        chosen["frame_rate_hz"] = rendered.world.frame_rate_hz
     problem = open_problem(env_config(**chosen))
     frames = sum(clip.frames for clip in problem.clips)
     with progress(frames, "unwrapping", "frame") as bar:
@@ -78,46 +84,167 @@ def table_arguments(parser: ArgumentParser) -> None:
 
 def compare_methods(arguments: Namespace) -> int:
     """Train, score and show every method of the results table."""
+    from shotenv.dataset import sources
     from unwrap.comparison import TableConfig, make_table
 
     config = section_of(TableConfig, arguments)
-    write_numbers(arguments, make_table(config, arguments.out, arguments.page, arguments.only))
+    rows = make_table(config, sources, arguments.out, arguments.page, arguments.only)
+    write_numbers(arguments, rows)
     return DONE
 
 
 def correct_arguments(parser: ArgumentParser) -> None:
     """Which recording, of which camera, and where its depth goes."""
-    from unwrap.recordings import add_arguments
-
-    add_arguments(parser)
+    parser.add_argument("input", type=Path, help=".npy, .npz, or a folder of 16-bit PNG files")
+    add_sensor_and_merge(parser)
+    parser.add_argument("--unwrapper", default="tofsegnet", help="name or path of a network")
+    add_out(parser, "runs/corrected", "folder of the depth")
+    parser.add_argument("--gray", type=Path, metavar="FILE", help="gray images (.npy, .npz, .png)")
+    parser.add_argument("--offset", type=Path, metavar="FILE", help="dark-offset map (.npy), LSB")
+    parser.add_argument("--wiggle", type=Path, metavar="FILE", help="the sensor's own wiggle table")
+    parser.add_argument("--noise-lsb", type=float, metavar="X", help="std of a sample, LSB")
+    parser.add_argument("--fov-deg", type=float, default=60.0, help="horizontal field of view")
+    parser.add_argument("--overwrite", action="store_true", help="replace files that stand in DIR")
     add_json(parser)
 
 
-def correct_recording(arguments: Namespace) -> int:
-    """Correct a recording."""
-    from unwrap.recordings import correct_files
+def correct_files(arguments: Namespace) -> int:
+    """Correct a recording; where anything is refused, nothing is written."""
+    from shotenv.config import SensorConfig, find_config, read_config
+    from shotenv.sensor import description_of
+    from unwrap.recordings import (
+        camera_of,
+        correct_recording,
+        load_recording,
+        refuse_overwriting,
+        write_frames,
+    )
 
-    write_numbers(arguments, correct_files(arguments))
+    sensor = read_config(SensorConfig, find_config("sensor", arguments.sensor))
+    camera = camera_of(
+        description_of(sensor),
+        bits=sensor.adc_bits,
+        unwrapper=arguments.unwrapper,
+        merge=arguments.merge,
+        horizontal_fov_deg=arguments.fov_deg,
+        wiggle=arguments.wiggle,
+        noise_lsb=arguments.noise_lsb,
+    )
+    recording = load_recording(
+        arguments.input, bits=camera.bits, gray=arguments.gray, offset=arguments.offset
+    )
+    if not arguments.overwrite:
+        refuse_overwriting(recording, arguments.out)
+    frames = correct_recording(recording, camera)
+    with progress(len(frames), "writing", "frame") as bar:
+        found = write_frames(frames, camera, arguments.out, tick=bar.update)
+    for frame in found["frames"]:
+        told = f"{100 * frame['valid_share']:.1f} % valid, median {frame['median_m']:.3f} m"
+        if frame["pixels_beyond_png"]:
+            told += f", {frame['pixels_beyond_png']} beyond 65.535 m in the PNG"
+        print(f"{frame['folder']}: {told}")
+    write_numbers(arguments, found)
     return DONE
 
 
 def export_arguments(parser: ArgumentParser) -> None:
-    """Which network, and the file that it goes to."""
-    from unwrap.export import add_arguments
-
-    add_arguments(parser)
+    """Which network for which frames, what it is checked with, and the file that it goes to."""
+    parser.add_argument("unwrapper", help="name or path of a network")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE.onnx")
+    parser.add_argument("--height", type=int, default=240, help="pixels down")
+    parser.add_argument("--width", type=int, default=320, help="pixels across")
+    parser.add_argument(
+        "--shots",
+        type=int,
+        metavar="N",
+        help="samples of each frame, 2 or 4 (default), for a network that looks at them",
+    )
+    add_sensor_and_merge(parser)
+    parser.add_argument("--int8", action="store_true", help="write FILE.int8.onnx, quantised, too")
+    parser.add_argument(
+        "--check-bank",
+        metavar="BANK",
+        help="name or path of a bank to check and calibrate with, or none: made-up images "
+        "(default: starter where it is rendered, else none)",
+    )
     add_json(parser)
 
 
 def export_network(arguments: Namespace) -> int:
-    """Write a network as ONNX."""
-    from unwrap.export import export_files
+    """Write a network as ONNX; a file that disagrees with torch is not written."""
+    from shotenv.config import env_config
+    from shotenv.dataset import bank_export_frames, choose_check_bank
+    from shotenv.sensor import description_of
+    from unwrap import load_unwrapper
+    from unwrap.export import (
+        CALIBRATION_FRAMES,
+        CHECKED_FRAMES,
+        OPSET,
+        CheckedExport,
+        ExportFrames,
+        exported_network,
+        made_up_frames,
+        metadata_of,
+        shots_of,
+    )
 
-    write_numbers(arguments, export_files(arguments))
+    config = env_config(sensor=arguments.sensor)
+    sensor = description_of(config.sensor)
+    unwrapper, size = load_unwrapper(arguments.unwrapper), _image_size(arguments)
+    shots = shots_of(unwrapper, arguments.shots)
+    network = exported_network(unwrapper, sensor, arguments.merge)
+    bank = choose_check_bank(arguments.check_bank, config.sensor)
+
+    def frames_of(split: str, count: int) -> ExportFrames:
+        if bank is None:
+            return made_up_frames(split, count, size, sensor, shots)
+        return bank_export_frames(bank, split, count, size, config, shots)
+
+    frames = frames_of("test", CHECKED_FRAMES)
+    metadata = metadata_of(unwrapper, arguments.merge, sensor, config.sensor.name, size, shots)
+    export = CheckedExport(network, frames, metadata)
+    found: dict[str, Any] = {"frames": frames.source, "opset": OPSET}
+    found["onnx"] = export.write(arguments.out)
+    _tell_of_file(found["onnx"])
+    if arguments.int8:
+        calibration = frames_of("train", CALIBRATION_FRAMES)
+        found["int8"] = export.write_int8(arguments.out.with_suffix(".int8.onnx"), calibration)
+        _tell_of_file(found["int8"])
+    write_numbers(arguments, found)
     return DONE
 
 
-COMMANDS = (
+def _image_size(arguments: Namespace) -> tuple[int, int]:
+    """Height and width in pixels, checked."""
+    for name in ("height", "width"):
+        if not 16 <= arguments[name] <= 4096:
+            raise ValueError(f"{name} is {arguments[name]}; expected 16 to 4096 pixels")
+    return arguments.height, arguments.width
+
+
+def _tell_of_file(found: dict[str, Any]) -> None:
+    """One line on an ONNX file: its size and its share of equal and of right wraps."""
+    told = f"{found['file']}: {found['bytes'] / 1e6:.1f} MB, same wrap as torch in "
+    told += f"{100 * found['same_wraps']:.3f} % of the pixels"
+    if found["wrap_accuracy"] is not None:
+        told += (
+            f"; right wrap in {100 * found['wrap_accuracy']:.2f} %, "
+            f"torch {100 * found['wrap_accuracy_torch']:.2f} %"
+        )
+    print(told)
+
+
+def add_sensor_and_merge(parser: ArgumentParser) -> None:
+    """`--sensor` and `--merge`."""
+    from unwrap.depth import Merge
+
+    parser.add_argument("--sensor", default="epc660", help="name or path of a sensor configuration")
+    parser.add_argument(
+        "--merge", type=Merge, default="nearest", help="nearest, floor (eq. 6), or none"
+    )
+
+
+COMMANDS: tuple[Command, ...] = (
     Command(
         "unwrap train",
         "train an unwrapping network on a rendered bank",
@@ -142,7 +269,7 @@ COMMANDS = (
         "unwrap correct",
         "correct recorded samples: depth, points, picture",
         correct_arguments,
-        correct_recording,
+        correct_files,
     ),
     Command(
         "unwrap export",

@@ -21,7 +21,7 @@ from torch import Tensor
 
 from shotenv.bank.bank import Bank
 from shotenv.bank.folders import cache_dir
-from shotenv.bank.store import DAMAGED_HEADER, sha256_of, write_array
+from shotenv.bank.store import sha256_of, write_array
 from unwrap.networks import Prediction, Unwrapper
 from unwrap.support import progress, write_json
 
@@ -83,7 +83,7 @@ def _load(folder: Path, bank: Bank) -> KeptPredictions | None:
         if any(sha256_of(folder / f"{name}.npy") != hashes[name] for name in ARRAYS):
             return None
         maps = [np.load(folder / f"{n}.npy", mmap_mode="c", allow_pickle=False) for n in ARRAYS]
-    except (*DAMAGED_HEADER, KeyError):
+    except (OSError, ValueError, KeyError, TypeError):
         return None
     shape = (len(bank), bank.height, bank.width)
     if any(found.shape != shape or found.dtype != np.float16 for found in maps):

@@ -10,7 +10,6 @@ import hashlib
 import json
 import os
 import shutil
-import tokenize
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -29,14 +28,10 @@ from shotenv.bank.layout import (
     Manifest,
 )
 from shotenv.config import BankConfig, one_sentence
-from unwrap.support import write_json
+from unwrap.support import read_npy_header, write_json
 
 LARGEST_JSON_BYTES = 64 * 2**20
 """A manifest has some 2 kB for each clip."""
-
-DAMAGED_HEADER = (OSError, ValueError, TypeError, SyntaxError, tokenize.TokenError, RecursionError)
-"""What NumPy raises on headers that are none, for it reads them as Python: `{'shape': (3, ` is a
-TokenError, keys of several types are a TypeError, and a thousand brackets a RecursionError."""
 
 
 def write_clip(
@@ -205,16 +200,14 @@ def _check_header(path: Path, clip: ClipRecord, spec: ArraySpec, manifest: Manif
     expected = int(np.prod(shape)) * np.dtype(spec.dtype).itemsize
     try:
         with path.open("rb") as file:
-            version = np.lib.format.read_magic(file)
-            if version != (1, 0):
-                raise ValueError("unexpected version")
-            found, fortran, dtype = np.lib.format.read_array_header_1_0(file)
+            header = read_npy_header(file)
             length = path.stat().st_size - file.tell()
-    except DAMAGED_HEADER:
+    except (OSError, ValueError):
         raise BankError(f"{path} is missing or damaged; {_cure(path)}") from None
-    if found != shape or fortran or dtype != spec.dtype or length != expected:
+    promised = (header.shape, header.fortran_order, header.dtype, length)
+    if promised != (shape, False, np.dtype(spec.dtype), expected):
         raise BankError(
-            f"{path} holds {dtype} {found}, {length} bytes; expected {spec.dtype} "
+            f"{path} holds {header.dtype} {header.shape}, {length} bytes; expected {spec.dtype} "
             f"{shape}, {expected} bytes; {_cure(path)}"
         )
 

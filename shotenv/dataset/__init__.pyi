@@ -2,5 +2,9 @@ from .bank_scores import (
     measure_unwrapping as measure_unwrapping,
     print_unwrapping as print_unwrapping,
 )
+from .export_inputs import (
+    bank_export_frames as bank_export_frames,
+    choose_check_bank as choose_check_bank,
+)
 from .sensed_frames import SensedFrames as SensedFrames
 from .source import sources as sources

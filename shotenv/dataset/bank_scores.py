@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from itertools import islice
 from typing import Any, Final
 
@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from shotenv.bank import Clip
-from shotenv.decision import Acquisition, Problem, acquire_depth, draw_drive, noise_of
+from shotenv.decision import Problem, acquire_depth, draw_drive, noise_of
 from unwrap.depth import Scores, evaluate, mean_scores
 from unwrap.signal import Shots
 
@@ -48,10 +48,14 @@ def _clip_scores(problem: Problem, clip: Clip) -> list[Scores]:
         noise = list(islice(noise_of(drive, step, bank.height, bank.width), Shots.EIGHT))
         made = {shots: acquire_depth(problem, drive, step, shots, noise=noise) for shots in Shots}
         one = made[Shots.EIGHT]
+        # One prediction serves all, unless the network looks at the samples of each acquisition.
+        predicted_m: Tensor | dict[Shots, Tensor] = one.predicted_m
+        if problem.fusion is not None:
+            predicted_m = {shots: acquisition.predicted_m for shots, acquisition in made.items()}
         scores.append(
             evaluate(
                 {shots: acquisition.raw for shots, acquisition in made.items()},
-                _predictions(problem, made),
+                predicted_m,
                 one.truth_m,
                 one.scored > 0,
                 problem.description,
@@ -61,15 +65,6 @@ def _clip_scores(problem: Problem, clip: Clip) -> list[Scores]:
             )
         )
     return scores
-
-
-def _predictions(
-    problem: Problem, made: Mapping[Shots, Acquisition]
-) -> Tensor | dict[Shots, Tensor]:
-    """One prediction for all acquisitions of a frame, or each one's own, made of its samples."""
-    if problem.fusion is None:
-        return made[Shots.EIGHT].predicted_m
-    return {shots: acquisition.predicted_m for shots, acquisition in made.items()}
 
 
 def print_unwrapping(found: dict[str, Any]) -> None:

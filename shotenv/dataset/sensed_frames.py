@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 from typing import Literal
 
 import torch
@@ -12,6 +11,7 @@ from torch import Tensor
 
 from shotenv.bank import Bank, check_fits
 from shotenv.config import EnvConfig
+from shotenv.dataset.map_cache import MapCache
 from shotenv.decision import Drive, draw_drive
 from shotenv.sensor import (
     Exposure,
@@ -31,6 +31,10 @@ from unwrap.support import concatenate, mapped
 TruthOf = Literal["rendered", "measured"]
 RECORDED_DRAW = 0
 """Draw of the eight samples that measured truth is made of: it is recorded once."""
+# What the caches of one object may hold, 10^6 bytes. At 320 x 240 a drive's sensor has .6 MB of
+# offset maps, which all frames of its clip share; a frame's measured truth has .4 MB and is asked
+# for in every epoch: there is room for 2600 frames, more than `nearfield` has.
+DRIVES_MB, MEASURED_TRUTH_MB = 64, 1000
 
 
 class SensedFrames:
@@ -76,11 +80,18 @@ class SensedFrames:
         check_fits(bank, config.sensor)
         self.bank, self.frames, self.range_m = bank, frames, range_m
         self.truth_of, self.stride, self.remembers = truth, stride, remembers
+        # Of a drive only the sensor is used, not its course: its frames are drawn in vain.
         self._config = config.model_copy(update={"frames_per_drive": 2})
         self.sensor: SensorDescription = description_of(config.sensor)
         self.families = [bank.clip_of(index).family for index in frames.tolist()]
-        self._drive = lru_cache(maxsize=64)(self._draw_drive)
-        self._recorded = lru_cache(maxsize=4096)(self._measured_truth)
+        self._drive = MapCache(self._draw_drive, largest_mb=DRIVES_MB)
+        self._recorded = MapCache(self._measure_truth, largest_mb=MEASURED_TRUTH_MB)
+
+    @property
+    def held_out_families(self) -> tuple[str, ...]:
+        """Kinds of scene that the bank keeps from training, for its split "shift"."""
+        held_out = (clip.family for clip in self.bank.clips if clip.split == "shift")
+        return tuple(dict.fromkeys(held_out))
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -110,14 +121,14 @@ class SensedFrames:
         starts = self.bank.clip_of(index).start == index
         return number > 0 and not starts and int(self.frames[number - 1]) == index - 1
 
-    def moved(self, distance_m: Tensor, numbers: Sequence[int]) -> Memory:
-        """Distances [B, H, W] of the frames before, moved to the frames at `numbers`."""
-        return self._moved(distance_m, self.frames[list(numbers)])
+    def warp(self, distance_m: Tensor, numbers: Sequence[int]) -> Memory:
+        """Distances [B, H, W] of the frames before, as the frames at `numbers` would see them."""
+        return self._warp(distance_m, self.frames[list(numbers)])
 
-    def _moved(self, distance_m: Tensor, frames: Tensor) -> Memory:
+    def _warp(self, distance_m: Tensor, frames: Tensor) -> Memory:
         rendered = self.bank.config
         if rendered is None:
-            raise ValueError(f"bank {self.bank.folder} has no camera; its depth cannot be moved")
+            raise ValueError(f"bank {self.bank.folder} has no camera; its depth cannot be warped")
         period_s = 1.0 / rendered.world.frame_rate_hz
         return move_depth(
             distance_m,
@@ -133,6 +144,7 @@ class SensedFrames:
         return mapped(self._thinned, self.bank.exposure(frames))
 
     def _draw_drive(self, draw: int, seed: int) -> Drive:
+        """Laser, imager and temperature of the clip with this seed."""
         height, width = (-(-n // self.stride) for n in (self.bank.height, self.bank.width))
         own = stream_seed(Purpose.DRIVE, draw, seed)
         return draw_drive(own, self._config, self.bank.clips, height, width)
@@ -175,7 +187,7 @@ class SensedFrames:
         sensed = self._sensed(before, draw, shots)
         depth = correct_sensed(sensed, self._true_m(before), self.sensor)
         seen = depth.valid & (frames > starts)[:, None, None]
-        return self._moved(depth.distance_m.masked_fill(~seen, torch.nan), frames)
+        return self._warp(depth.distance_m.masked_fill(~seen, torch.nan), frames)
 
     def _truth(self, frames: Tensor) -> Truth:
         if self.truth_of == "measured":
@@ -186,7 +198,7 @@ class SensedFrames:
     def _true_m(self, frames: Tensor) -> Tensor:
         return self._thinned(self.bank.distance_m(frames)).clamp(max=self.range_m)
 
-    def _measured_truth(self, index: int) -> Truth:
+    def _measure_truth(self, index: int) -> Truth:
         """What eight samples tell of one frame, where the frequencies agree."""
         sensed = self._sensed(torch.tensor([index]), RECORDED_DRAW, Shots.EIGHT)
         depth = correct_sensed(sensed, None, self.sensor)

@@ -1,4 +1,4 @@
-"""TODO."""
+"""The splits of a bank as the sources that a network is trained and judged on."""
 
 from __future__ import annotations
 

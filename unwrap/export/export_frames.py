@@ -1,4 +1,4 @@
-"""Frames that an exported network is checked and calibrated with: of a bank, or made up."""
+"""Frames that an exported network is checked and calibrated with, and such frames made up."""
 
 from __future__ import annotations
 
@@ -9,35 +9,26 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from shotenv.bank import Bank, BankError, check_fits, open_bank
-from shotenv.config import EnvConfig, SensorConfig
-from shotenv.dataset import SensedFrames
-from shotenv.sensor import description_of
 from unwrap.signal import (
     GRAY_FULL_SCALE,
-    SAMPLES_PER_FREQUENCY,
     TWO_PI,
     RawFrame,
     Sensed,
     SensorDescription,
     Shots,
     correlation_samples,
-    decode,
-    distance_m,
     sample_noise_lsb,
     unambiguous_range_m,
     wrapped_distance_m,
 )
 from unwrap.support import mapped
 
-DEFAULT_BANK = "starter"
-MADE_UP = "none"
 OCTAVES = (4, 8, 16, 32)
 """Details of made-up images: grids of so many cells down and across."""
 LARGEST_WORD = 2047
 """Of a 12-bit converter, about its mid-scale."""
-DRAW = 0
-"""Draw of noise, laser power and temperature that a bank's frames are sensed with."""
+FARTHEST_M = 30.0
+"""Largest distance made up: beyond the range of the sensors, so that every wrap occurs."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +40,7 @@ class ExportFrames:
     source : str
         Where they come from, in words.
     inputs : mapping of str to Tensor [N, ...]
-        What the file takes, by name: see `unwrap.export.onnx_files`.
+        What the file takes, by name: those of `forward` in `unwrap.export.onnx_graph`.
     wrapped_m : float32 [N, H, W]
         Wrapped distances at f1: without noise beside gray images, else as the samples tell them.
     truth_m : float32 [N, H, W] or None
@@ -70,89 +61,26 @@ class ExportFrames:
         frames = zip(*(values.split(1) for values in self.inputs.values()), strict=True)
         return [dict(zip(self.inputs, frame, strict=True)) for frame in frames]
 
+    def resized(self, size: tuple[int, int]) -> ExportFrames:
+        """Frames with every map at `size` (height, width): the pixels nearest above and left.
 
-def choose_bank(name: str | None, sensor: SensorConfig) -> Bank | None:
-    """Bank by name or path; None for "none", and for no name where the starter does not stand.
+        Nothing is interpolated, since a phase between two wraps would be one that nobody measured.
+        """
+        rows, columns = (
+            torch.arange(wanted) * given // wanted
+            for wanted, given in zip(size, self.wrapped_m.shape[-2:], strict=True)
+        )
 
-    Raises
-    ------
-    ValueError
-        A named bank is missing, or was rendered for another sensor.
-    """
-    if name == MADE_UP:
-        return None
-    try:
-        bank = open_bank(name or DEFAULT_BANK, render=False)
-    except BankError:
-        if name is None:
-            return None
-        raise
-    check_fits(bank, sensor)
-    return bank
+        def picked(values: Tensor) -> Tensor:
+            return values[..., rows, :][..., columns] if values.ndim > 1 else values
 
-
-def export_frames(
-    bank: Bank | None,
-    split: str,
-    count: int,
-    size: tuple[int, int],
-    config: EnvConfig,
-    shots: Shots | None = None,
-) -> ExportFrames:
-    """`count` frames of a split, evenly spread; images of another size than `size` are scaled.
-
-    Parameters
-    ----------
-    bank : Bank or None
-        None makes images up.
-    split : str
-    count : int
-    size : tuple of two int
-        Height and width, pixels.
-    config : EnvConfig
-        Of it the sensor, the laser and the frame rate.
-    shots : Shots or None
-        Samples of each frame, two or four, for a network that looks at them; None for one that
-        looks at the gray image alone.
-    """
-    if bank is None:
-        return _made_up(split, count, size, config.sensor, shots)
-    frames = bank.frames(split)
-    frames = frames[torch.linspace(0, len(frames) - 1, min(count, len(frames))).long()]
-    source = f"{len(frames)} {split} frames of bank {bank.manifest.name}"
-    if shots is None:
-        found = _gray_frames(bank, frames, config.sensor, source)
-    else:
-        found = _sample_frames(bank, frames, config, shots, source)
-    return _scaled(found, size)
-
-
-def _gray_frames(bank: Bank, frames: Tensor, sensor: SensorConfig, source: str) -> ExportFrames:
-    exposure = bank.exposure(frames)
-    first = decode(exposure.correlation[:, :SAMPLES_PER_FREQUENCY])
-    wrapped_m = distance_m(first.phase_rad, sensor.f1_hz)
-    return ExportFrames(
-        source=source,
-        inputs={"gray": bank.gray(frames), "wrapped_m": wrapped_m},
-        wrapped_m=wrapped_m,
-        truth_m=exposure.distance_m,
-        scored=exposure.distance_m <= sensor.max_range_m,
-    )
-
-
-def _sample_frames(
-    bank: Bank, frames: Tensor, config: EnvConfig, shots: Shots, source: str
-) -> ExportFrames:
-    sensed_frames = SensedFrames(bank, frames, config, range_m=config.sensor.max_range_m)
-    numbers = range(len(frames))
-    sensed, _ = sensed_frames.batch(numbers, draw=DRAW, shots=shots)
-    return ExportFrames(
-        source=f"{source}, {shots:d} samples each",
-        inputs=sample_inputs(bank.gray(frames), sensed, sensed_frames.sensor),
-        wrapped_m=wrapped_distance_m(sensed, sensed_frames.sensor),
-        truth_m=bank.exposure(frames).distance_m,
-        scored=sensed_frames.scored(numbers, draw=DRAW),
-    )
+        return replace(
+            self,
+            inputs={name: picked(values) for name, values in self.inputs.items()},
+            wrapped_m=picked(self.wrapped_m),
+            truth_m=mapped(picked, self.truth_m),
+            scored=mapped(picked, self.scored),
+        )
 
 
 def sample_inputs(gray: Tensor, sensed: Sensed, sensor: SensorDescription) -> dict[str, Tensor]:
@@ -179,45 +107,42 @@ def sample_inputs(gray: Tensor, sensed: Sensed, sensor: SensorDescription) -> di
     }
 
 
-def _scaled(frames: ExportFrames, size: tuple[int, int]) -> ExportFrames:
-    """Frames with every map at `size`: the pixels nearest above and to the left."""
-    rows, columns = (
-        torch.arange(wanted) * given // wanted
-        for wanted, given in zip(size, frames.wrapped_m.shape[-2:], strict=True)
-    )
-
-    def scaled(values: Tensor) -> Tensor:
-        return values[..., rows, :][..., columns] if values.ndim > 1 else values
-
-    return replace(
-        frames,
-        inputs={name: scaled(values) for name, values in frames.inputs.items()},
-        wrapped_m=scaled(frames.wrapped_m),
-        truth_m=mapped(scaled, frames.truth_m),
-        scored=mapped(scaled, frames.scored),
-    )
-
-
-def _made_up(
-    split: str, count: int, size: tuple[int, int], sensor: SensorConfig, shots: Shots | None
+def made_up_frames(
+    split: str,
+    count: int,
+    size: tuple[int, int],
+    sensor: SensorDescription,
+    shots: Shots | None = None,
 ) -> ExportFrames:
-    """Clouds of light and of distance, other ones for each split; always the same."""
+    """Clouds of light and of distance, always the same ones; others for the split "train".
+
+    Parameters
+    ----------
+    split : str
+        "train", to calibrate with, or another, to check with.
+    count : int
+    size : tuple of two int
+        Height and width, pixels.
+    sensor : SensorDescription
+    shots : Shots or None
+        Samples of each frame, two or four, for a network that looks at them; None for one that
+        looks at the gray image alone.
+    """
     # 12 decorrelates the two splits that are ever asked for.
     generator = torch.Generator().manual_seed(12 if split == "train" else 0)
     light, far = (_clouds(count, size, generator) for _ in range(2))
     gray = (GRAY_FULL_SCALE * torch.sigmoid(2.0 * light - 1.0)).round().to(torch.uint16)
-    distance, source = 30.0 * torch.sigmoid(2.0 * far), f"{count} made-up images"
+    distance, source = FARTHEST_M * torch.sigmoid(2.0 * far), f"{count} made-up images"
     if shots is None:
         wrapped_m = distance.remainder(unambiguous_range_m(sensor.f1_hz))
         return ExportFrames(source, {"gray": gray, "wrapped_m": wrapped_m}, wrapped_m)
     phase_rad = distance * (TWO_PI / unambiguous_range_m(sensor.f1_hz))
     strength = torch.sigmoid(2.0 * _clouds(count, size, generator) - 2.0)
     sensed = _made_up_samples(gray, phase_rad, strength, shots, generator)
-    described = description_of(sensor)
     return ExportFrames(
         f"{source}, {shots:d} samples each",
-        sample_inputs(gray, sensed, described),
-        wrapped_distance_m(sensed, described),
+        sample_inputs(gray, sensed, sensor),
+        wrapped_distance_m(sensed, sensor),
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import zipfile
 import zlib
 from collections.abc import Collection
@@ -10,14 +9,14 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
-from numpy.lib import format as npy
+
+from unwrap.support import read_npy_header
 
 MAX_BYTES = 1 << 28
 """Largest file, and largest sum of the arrays in one."""
-_HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 _BROKEN = (
-    *(OSError, ValueError, TypeError, KeyError, EOFError, SyntaxError, RecursionError),
-    *(OverflowError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error),
+    *(OSError, ValueError, KeyError, EOFError, NotImplementedError, RuntimeError),
+    *(zipfile.BadZipFile, zlib.error),
 )
 """What reading damaged files raises."""
 
@@ -72,16 +71,14 @@ def _read_npz(path: Path, known: Collection[str]) -> dict[str, np.ndarray]:
 
 def _read_npy(file: IO[bytes], size: int) -> np.ndarray:
     """One array; its header must promise exactly the bytes that follow."""
-    version = npy.read_magic(file)
-    if version not in _HEADERS:
-        raise ValueError(f"npy version {version}; expected (1, 0) or (2, 0)")
-    shape, _, dtype = _HEADERS[version](file)
-    if dtype.hasobject:
+    header = read_npy_header(file)
+    if header.dtype.hasobject:
         raise ValueError("holds pickled objects, which are never read; expected plain numbers")
-    promised, following = math.prod(shape) * dtype.itemsize, size - file.tell()
-    if promised != following or any(length < 1 for length in shape):
+    following = size - file.tell()
+    if header.nbytes != following or any(length < 1 for length in header.shape):
         raise ValueError(
-            f"its header promises {dtype} {shape}, {promised} bytes; {following} bytes follow"
+            f"its header promises {header.dtype} {header.shape}, {header.nbytes} bytes; "
+            f"{following} bytes follow"
         )
     file.seek(0)
-    return npy.read_array(file, allow_pickle=False)
+    return np.lib.format.read_array(file, allow_pickle=False)

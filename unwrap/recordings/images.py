@@ -35,6 +35,7 @@ def read_gray16(path: Path) -> np.ndarray:
     """
     try:
         with warnings.catch_warnings():
+            # Pillow only warns of images that would fill the memory; their header tells.
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(path, formats=["PNG"]) as image:
                 if image.mode != "I;16":
@@ -59,7 +60,7 @@ def read_folder(folder: Path, *, bits: int = ADC_BITS) -> Recording:
         `read_gray16` refuse.
     """
     if any(folder.glob("dcs_*.png")):
-        return recording_of(_frame(folder), str(folder), bits=bits)
+        return recording_of(_read_frame(folder), str(folder), bits=bits)
     frames = sorted(path for path in folder.iterdir() if any(path.glob("dcs_*.png")))
     if not frames:
         raise ValueError(
@@ -67,14 +68,18 @@ def read_folder(folder: Path, *, bits: int = ADC_BITS) -> Recording:
         )
     if sum(path.stat().st_size for frame in frames for path in frame.glob("*.png")) > MAX_BYTES:
         raise ValueError(f"{folder}: larger than {MAX_BYTES >> 20} MiB; split it")
-    arrays = [_frame(frame) for frame in frames]
-    _require_alike(frames, arrays)
+    arrays = [_read_frame(frame) for frame in frames]
+    kinds = [{name: array.shape for name, array in frame.items()} for frame in arrays]
+    for frame, kind in zip(frames, kinds, strict=True):
+        if kind != kinds[0]:
+            raise ValueError(f"{frame}: holds {kind}; expected {kinds[0]}, as {frames[0].name}")
     together = {name: np.stack([frame[name] for frame in arrays]) for name in arrays[0]}
     names = tuple(frame.name for frame in frames)
     return recording_of(together, str(folder), bits=bits, names=names)
 
 
-def _frame(folder: Path) -> dict[str, np.ndarray]:
+def _read_frame(folder: Path) -> dict[str, np.ndarray]:
+    """`dcs` [n, H, W] and, if there is one, `gray` [H, W] of a folder of images."""
     numbers = sorted(
         int(found[1])
         for path in folder.glob("dcs_*.png")
@@ -88,13 +93,6 @@ def _frame(folder: Path) -> dict[str, np.ndarray]:
     gray = folder / "gray.png"
     passive = {"gray": read_gray16(gray)} if gray.is_file() else {}
     return {"dcs": np.stack(samples), **passive}
-
-
-def _require_alike(frames: list[Path], arrays: list[dict[str, np.ndarray]]) -> None:
-    kinds = [{name: array.shape for name, array in frame.items()} for frame in arrays]
-    for frame, kind in zip(frames, kinds, strict=True):
-        if kind != kinds[0]:
-            raise ValueError(f"{frame}: holds {kind}; expected {kinds[0]}, as {frames[0].name}")
 
 
 def depth_png(distance_m: np.ndarray, valid: np.ndarray) -> bytes:

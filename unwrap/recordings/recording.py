@@ -1,8 +1,8 @@
 """Recordings of a camera: samples and gray images from files to frames that can be unwrapped.
 
 A recording holds `dcs` [n, H, W] or, of several frames, [F, n, H, W], n = 2, 4 or 8, in the order
-of `unwrap.signal.shots`. Unsigned integers are words of the converter, see `unwrap.signal.words`; signed
-integers and floats are samples in LSB.
+of `unwrap.signal.shots`. Unsigned integers are words of the converter, see `unwrap.signal.words`;
+signed integers and floats are samples in LSB.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def read_recording(path: Path, *, bits: int = ADC_BITS) -> Recording:
     Raises
     ------
     ValueError
-        What `unwrap.recordings.arrays.read_arrays` and `recording_of` refuse; the message names the file.
+        What `read_arrays` and `recording_of` refuse; the message names the file.
     NoUsablePixelError
         A frame whose pixels are all saturated.
     """
@@ -109,10 +109,14 @@ def recording_of(
     batch = dcs[None] if dcs.ndim == 3 else dcs
     if names is None:
         names = ("",) if dcs.ndim == 3 else tuple(f"{number:05d}" for number in range(len(dcs)))
-    raw = _raw(batch, where, bits)
+    raw = _raw_frame(batch, where, bits)
     if "saturated" in arrays:
-        flags = _saturated(arrays["saturated"], raw.saturated, where)
-        raw = replace(raw, saturated=raw.saturated | flags)
+        flags = arrays["saturated"]
+        if flags.dtype != np.bool_:
+            raise ValueError(f"{where}: saturated is {flags.dtype}; expected bool")
+        flags = _batched(flags, raw.saturated.shape, "saturated", where)
+        # Joined to what the samples show: a camera flags taps that were full before conversion.
+        raw = replace(raw, saturated=raw.saturated | torch.from_numpy(flags))
     _require_usable(raw, names, where)
     recording = Recording(raw, None, None, names)
     if "gray" in arrays:
@@ -151,9 +155,10 @@ def with_offset(recording: Recording, offset_lsb: np.ndarray, where: str) -> Rec
     return replace(recording, offset_lsb=_tensor(offset_lsb))
 
 
-def _raw(dcs: np.ndarray, where: str, bits: int) -> RawFrame:
+def _raw_frame(dcs: np.ndarray, where: str, bits: int) -> RawFrame:
     """Samples, flagged where they report overflow of the converter."""
     kind, low, high = dcs.dtype.kind, -mid_scale(bits), mid_scale(bits) - 1
+    # Bytes are refused: they would be words cut short, whose wraps look like good samples.
     if kind == "u" and dcs.dtype.itemsize > 1:
         if dcs.max() > high - low:
             raise ValueError(f"{where}: dcs holds words up to {dcs.max()}; expected {bits} bits")
@@ -171,12 +176,6 @@ def _raw(dcs: np.ndarray, where: str, bits: int) -> RawFrame:
         )
     samples = _tensor(dcs)
     return RawFrame(samples, ((samples <= low) | (samples >= high)).any(1))
-
-
-def _saturated(flags: np.ndarray, of: Tensor, where: str) -> Tensor:
-    if flags.dtype != np.bool_:
-        raise ValueError(f"{where}: saturated is {flags.dtype}; expected bool")
-    return torch.from_numpy(_batched(flags, of.shape, "saturated", where))
 
 
 def _batched(maps: np.ndarray, expected: torch.Size, name: str, where: str) -> np.ndarray:

@@ -6,6 +6,7 @@ from .compiled import (
     loop as loop,
 )
 from .files import write_bytes as write_bytes, write_json as write_json, write_text as write_text
+from .npy_header import NpyHeader as NpyHeader, read_npy_header as read_npy_header
 from .process_state import (
     keep_freed_memory as keep_freed_memory,
     torch_threads as torch_threads,

@@ -1,5 +1,6 @@
 from .config import TrainConfig as TrainConfig
 from .data import (
+    Source as Source,
     acquiring_threads as acquiring_threads,
     in_order as in_order,
     loader as loader,

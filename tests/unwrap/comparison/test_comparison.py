@@ -8,12 +8,24 @@ from PIL import Image
 from shotenv.bank.opening import open_bank
 from shotenv.config.keywords import env_config
 from shotenv.dataset.sensed_frames import SensedFrames
-from unwrap.comparison.methods import SCORED_AT_ONCE, Estimate, Method, classical_methods
-from unwrap.comparison.plan import TableConfig, trainings
-from unwrap.comparison.results_table import FIGURE, NUMBERS, PAGE, make_table
-from unwrap.comparison.scores import accuracy_and_precision, rows_of
+from shotenv.dataset.source import sources
+from unwrap.comparison.compared_methods import (
+    Estimate,
+    Method,
+    classical_methods,
+    network_methods,
+)
+from unwrap.comparison.method_scores import (
+    SCORED_AT_ONCE,
+    accuracy_and_precision,
+    score_methods,
+)
+from unwrap.comparison.table_figure import draw_frames
+from unwrap.comparison.table_run import FIGURE, NUMBERS, PAGE, make_table
+from unwrap.comparison.table_trainings import TableConfig, planned_trainings
 from unwrap.depth.correction import correct_sensed
 from unwrap.depth.metrics import MIN_DEPTH_M
+from unwrap.networks.predictor import load_unwrapper
 from unwrap.signal.shots import Shots
 
 
@@ -38,7 +50,7 @@ def test_a_perfect_method_has_no_error_and_a_blind_one_the_scene_s(frames):
         Method("perfect", "none", (Shots.TWO, Shots.FOUR), perfect),
         Method("blind", "none", (Shots.TWO,), blind),
     ]
-    rows = {(row["method"], row["shots"]): row for row in rows_of(methods, frames)}
+    rows = {(row["method"], row["shots"]): row for row in score_methods(methods, frames)}
     assert set(rows) == {("perfect", 2), ("perfect", 4), ("blind", 2)}
     best = rows["perfect", 2]
     assert best["mae_m"] == best["calibration_error"] == 0
@@ -59,9 +71,9 @@ def test_frames_looked_at_together_score_as_one_by_one(frames, monkeypatch):
         return Estimate(depth_m, sensed.gray)
 
     methods = [Method(f"{i}", "none", (Shots.FOUR,), look, remembers=i > 0) for i in range(2)]
-    alone = rows_of(methods, frames)
+    alone = score_methods(methods, frames)
     monkeypatch.setitem(SCORED_AT_ONCE, "cpu", 3)
-    assert rows_of(methods, frames) == alone
+    assert score_methods(methods, frames) == alone
 
 
 def test_what_remembers_gets_its_own_trusted_depth_moved(frames):
@@ -73,7 +85,7 @@ def test_what_remembers_gets_its_own_trusted_depth_moved(frames):
         confidence[:, :, :16] = 0.2
         return Estimate(torch.full_like(sensed.gray, 10.0), confidence)
 
-    rows_of([Method("m", "none", (Shots.FOUR,), look, remembers=True)], frames)
+    score_methods([Method("m", "none", (Shots.FOUR,), look, remembers=True)], frames)
     first = [number for number in range(len(frames)) if not frames.follows(number)]
     assert [i for i, memory in enumerate(shown) if memory is None] == first
     memory = shown[1]
@@ -81,6 +93,33 @@ def test_what_remembers_gets_its_own_trusted_depth_moved(frames):
     assert known[:, 20:].float().mean() > 0.5
     assert known[:, :10].float().mean() < 0.2
     assert (memory.distance_m[0][known] <= 10.0 + 1e-3).all()
+
+
+def test_a_network_looks_once_at_a_batch_however_many_rules_merge(frames, tiny_unwrapper):
+    unwrapper = load_unwrapper(tiny_unwrapper)
+    looked = []
+
+    class Counting:
+        network = unwrapper.network
+
+        def look(self, sensed, sensor):
+            looked.append(len(sensed))
+            return unwrapper.predict_sensed(sensed, sensor)
+
+    (training, *_) = planned_trainings(TableConfig(networks=("tofregnet",)))
+    methods = list(network_methods(training, Counting()))
+    assert [method.merge for method in methods] == ["none", "floor", "nearest"]
+    rows = score_methods(methods, frames)
+    assert len(rows) == 6 and len(looked) == 2 * len(frames)
+    alone = [score_methods([method], frames)[1] for method in methods]
+    assert alone == rows[1::2]
+
+
+def test_the_figure_shows_whatever_networks_there_are(frames, tiny_unwrapper):
+    unwrapper = load_unwrapper(tiny_unwrapper)
+    one = draw_frames({"a": unwrapper}, frames, [0])
+    two = draw_frames({"a": unwrapper, "b": unwrapper}, frames, [0])
+    assert two.width > one.width and two.height == one.height
 
 
 def test_accuracy_and_precision_of_known_errors():
@@ -91,7 +130,7 @@ def test_accuracy_and_precision_of_known_errors():
 
 
 def test_the_paper_s_networks_are_trained_on_both_splits_and_truths():
-    planned = list(trainings(TableConfig()))
+    planned = list(planned_trainings(TableConfig()))
     papers = {
         (t.config.network, t.config.split_by, t.config.truth)
         for t in planned
@@ -107,9 +146,9 @@ def test_the_paper_s_networks_are_trained_on_both_splits_and_truths():
 def test_the_table_is_made_once_and_goes_on_where_it_stopped(tiny_bank, tmp_path, monkeypatch):
     networks = ("tofregnet", "tofsegnet", "phasenet", "toffusionnet")
     config = TableConfig(bank=tiny_bank, width=4, epochs=1, batch_size=8, networks=networks)
-    assert make_table(config, tmp_path, only=["tofsegnet"]) == []
+    assert make_table(config, sources, tmp_path, only=["tofsegnet"]) == []
     assert not (tmp_path / PAGE).exists()
-    rows = make_table(config, tmp_path)
+    rows = make_table(config, sources, tmp_path)
     assert json.loads((tmp_path / NUMBERS).read_text())["rows"] == rows
     keys = {(row["method"], row["shots"], row["merge"], row["split"], row["truth"]) for row in rows}
     assert len(keys) == len(rows)
@@ -124,13 +163,13 @@ def test_the_table_is_made_once_and_goes_on_where_it_stopped(tiny_bank, tmp_path
     def never(*_, **__):
         raise AssertionError("trained again")
 
-    monkeypatch.setattr("unwrap.comparison.plan.train", never)
-    assert make_table(config, tmp_path) == rows
+    monkeypatch.setattr("unwrap.comparison.table_trainings.train", never)
+    assert make_table(config, sources, tmp_path) == rows
 
 
 def test_an_unknown_network_is_named(tmp_path):
     with pytest.raises(ValueError, match="unet"):
-        make_table(TableConfig(), tmp_path, only=["unet"])
+        make_table(TableConfig(), sources, tmp_path, only=["unet"])
 
 
 def test_two_frequencies_are_judged_without_rejection(frames):

@@ -13,15 +13,17 @@ import torch
 from agents.cli.entry import main
 from shotenv.bank.opening import open_bank
 from shotenv.config.keywords import env_config
+from shotenv.dataset.export_inputs import bank_export_frames
 from shotenv.sensor.description import description_of
 from unwrap.depth.correction import correct_sensed
 from unwrap.depth.merge import merge_nearest, merge_segmentation
-from unwrap.export import check as exporting
-from unwrap.export.export_frames import export_frames
-from unwrap.export.onnx_files import exported, run as run_content, run_torch, to_onnx
+from unwrap.export import checked_export
+from unwrap.export.export_frames import made_up_frames
+from unwrap.export.onnx_conversion import onnx_outputs, to_onnx, torch_outputs
+from unwrap.export.onnx_graph import exported_network
 from unwrap.networks.network import Settings
 from unwrap.networks.predictor import load_unwrapper
-from unwrap.networks.registry import build_network
+from unwrap.networks.registry import build
 from unwrap.networks.tofsegnet import TofSegNet
 from unwrap.networks.weight_files import save_weights
 from unwrap.signal.frames import RawFrame
@@ -90,7 +92,7 @@ def run(path, **inputs):
 def write_samples_network(path, name="toffusionnet", **metadata):
     """An untrained network that looks at samples, whose predictions vary from pixel to pixel."""
     torch.manual_seed(0)
-    network = build_network(name, Settings(width=4))
+    network = build(name, Settings(width=4))
     last = network.judge[-1] if name == "toffusionnet" else network.head
     last.weight.data.mul_(30.0 if name == "toffusionnet" else 1000.0)
     last.bias.data.zero_()
@@ -231,10 +233,10 @@ def test_samples_become_what_the_unwrapper_and_the_correction_make_of_them(fused
 )
 def test_peers_that_look_at_samples_serve_as_well(tmp_path, sensor, name):
     unwrapper = load_unwrapper(write_samples_network(tmp_path / "peer.safetensors", name))
-    network = exported(unwrapper, description_of(sensor), "nearest")
-    frames = export_frames(None, "test", 2, (HEIGHT, WIDTH), env_config(), Shots.TWO)
+    network = exported_network(unwrapper, description_of(sensor), "nearest")
+    frames = made_up_frames("test", 2, (HEIGHT, WIDTH), description_of(sensor), Shots.TWO)
     content = to_onnx(network, frames.one_by_one()[0], {})
-    found, expected = run_content(content, frames), run_torch(network, frames)
+    found, expected = onnx_outputs(content, frames), torch_outputs(network, frames)
     assert list(found) == list(expected)
     assert (found["wraps"] == expected["wraps"]).float().mean() > 0.999
     assert len(found["wraps"].unique()) > 1
@@ -298,7 +300,7 @@ def test_convolutions_at_the_inputs_and_outputs_are_not_quantised(request, folde
 
 def test_files_hold_no_path_of_the_machine(written, fused):
     for path in (*written.glob("*.onnx"), *fused.glob("*.onnx")):
-        assert b"onnx_files.py" not in path.read_bytes(), path
+        assert b"onnx_graph.py" not in path.read_bytes(), path
 
 
 def test_weights_are_float32_and_quantised_ones_8_bits(written):
@@ -317,7 +319,7 @@ def test_the_numbers_are_those_of_the_files(written, tiny_bank):
     small = numbers["int8"]
     assert small["calibration"] == "24 train frames of bank tiny"
     assert small["bytes"] == (written / "net.int8.onnx").stat().st_size
-    frames = export_frames(open_bank(tiny_bank), "test", 16, (HEIGHT, WIDTH), env_config())
+    frames = bank_export_frames(open_bank(tiny_bank), "test", 16, (HEIGHT, WIDTH), env_config())
     gray, wrapped_m = frames.inputs["gray"].numpy(), frames.wrapped_m.numpy()
     wraps = {
         n: run(written / n, gray=gray, wrapped_m=wrapped_m)["wraps"]
@@ -336,7 +338,7 @@ def test_the_numbers_of_samples_are_those_of_the_files(fused, tiny_bank):
     assert numbers["frames"] == "16 test frames of bank tiny, 4 samples each"
     assert numbers["int8"]["calibration"] == "24 train frames of bank tiny, 4 samples each"
     assert numbers["onnx"]["same_wraps"] > 0.999 and 0.5 < numbers["int8"]["same_wraps"] < 1
-    frames = export_frames(
+    frames = bank_export_frames(
         open_bank(tiny_bank), "test", 16, (HEIGHT, WIDTH), env_config(), Shots.FOUR
     )
     inputs = {name: values.numpy() for name, values in frames.inputs.items()}
@@ -359,8 +361,8 @@ def test_an_export_that_disagrees_is_refused_and_leaves_no_file(
         predicted_m = torch.zeros(frames.wrapped_m.shape)
         return {"predicted_m": predicted_m, "wraps": predicted_m.int() + 9}
 
-    monkeypatch.setattr(exporting, "to_onnx", lambda *_: content)
-    monkeypatch.setattr(exporting, "run", other_wraps)
+    monkeypatch.setattr(checked_export, "to_onnx", lambda *_: content)
+    monkeypatch.setattr(checked_export, "onnx_outputs", other_wraps)
     assert export(segmenting, "--out", tmp_path / "a.onnx", "--check-bank", "none") == 1
     err = capsys.readouterr().err
     assert "agree on the wrap of 0.000 %" in err and err.count("\n") == 1

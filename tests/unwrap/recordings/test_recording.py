@@ -144,8 +144,9 @@ def test_gray_images_of_another_file_are_checked_as_well():
         (header("{'descr': '<u2', 'fortran_order': False, 'shape': (9999999, 9999999)}"), "promis"),
         (header("{'descr': '<u2', 'fortran_order': False, 'shape': (-1, 4)}"), "promises"),
         (header("{'descr': '<u2', 'fortran_order': False, 'shape': 2 ** 9}"), "malformed"),
+        (header("{'descr': '<u2', 'fortran_order': False, 'shape': (4, 6, 8)"), "malformed"),
         (header("__import__('os').abort()"), "malformed"),
-        (b"\x93NUMPY\x01\x00" + (60000).to_bytes(2, "little") + b"(" * 60000, "npy"),
+        (b"\x93NUMPY\x01\x00" + (60000).to_bytes(2, "little") + b"(" * 60000, "malformed|large"),
         (b"\x93NUMPY\x03\x00" + bytes(90), "version"),
     ],
 )

@@ -1,4 +1,4 @@
-"""The results table: which networks are trained for it, and the training of each."""
+"""Which networks are trained for the results table, and the training of each."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from shotenv.dataset import sources
+from unwrap.comparison.catalogue import NETWORKS
+from unwrap.comparison.compared_frames import OpenSplits
 from unwrap.networks import NetworkName, Unwrapper, load_unwrapper
 from unwrap.support import Positive, Section, say
 from unwrap.training import TrainConfig, train
@@ -64,18 +65,10 @@ RECIPES: dict[RecipeName, dict[str, Any]] = {
     "paper": {"equation_7_mean_share": 1.0, "wrap_weight": 0.0, "flip_vertical": True},
     "ours": {"clip_norm": 1.0},
 }
-LABELS: dict[str, str] = {
-    "tofregnet": "TofRegNet",
-    "tofsegnet": "TofSegNet",
-    "toffusionnet": "TofFusionNet (ours)",
-    "su_net": "end to end (Su et al. 2018)",
-    "phasenet": "PhaseNet (Spoorthi et al. 2019)",
-    "agresti_net": "light network (Agresti et al.)",
-    "chen_net": "denoiser (Chen et al. 2020)",
-}
+"""Fields of `TrainConfig` that a recipe changes."""
 
 
-def trainings(config: TableConfig) -> Iterator[Training]:
+def planned_trainings(config: TableConfig) -> Iterator[Training]:
     """The paper's networks on both splits and both truths, the others on clips and rendered truth.
 
     TofRegNet also with our loss, which is what the shipped weights are trained with.
@@ -99,24 +92,30 @@ def _training(
     memory = network == "toffusionnet"
     ours = " with our loss" if network in PAPERS and recipe == "ours" else ""
     train_config = TrainConfig(network=network, memory=memory, **values)
-    return Training(LABELS[network] + ours, recipe, train_config)
+    return Training(NETWORKS[network].label + ours, recipe, train_config)
 
 
-def trained(training: Training, out: Path) -> Unwrapper:
-    """The network, trained now unless it stands in `out` already."""
+def train_missing(training: Training, open_splits: OpenSplits, out: Path) -> Unwrapper:
+    """Train the network unless it stands in `out` already, and load it; may take hours.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the table; the network has its own in it.
+    """
     config, folder = training.config, out / training.folder
     path = folder / f"{config.network}.safetensors"
-    if not _stands(path, config):
+    if not _is_trained(path, config):
         say(f"training {training.label}, split by {config.split_by}, {config.truth} truth")
-        train(config, sources(config), folder)
+        train(config, open_splits(config), folder)
     return load_unwrapper(path)
 
 
-def _stands(path: Path, config: TrainConfig) -> bool:
+def _is_trained(path: Path, config: TrainConfig) -> bool:
     """Whether the weights at `path` were trained as `config` says, to the end."""
+    # A training writes its numbers last, so that they tell of a finished one.
     numbers = path.with_suffix(".json")
     if not (path.is_file() and numbers.is_file()):
         return False
-    return json.loads(numbers.read_text(encoding="utf-8"))["config"] == config.model_dump(
-        mode="json"
-    )
+    trained_as = json.loads(numbers.read_text(encoding="utf-8"))["config"]
+    return trained_as == config.model_dump(mode="json")

@@ -1,4 +1,4 @@
-"""TODO."""
+"""Scores of methods: each judged on the same frames with the same noise."""
 
 from __future__ import annotations
 
@@ -11,24 +11,26 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from shotenv.dataset import SensedFrames
-from unwrap.comparison.methods import (
-    CPU,
-    SCORED_AT_ONCE,
-    TRUSTED,
-    Estimate,
-    Method,
-)
+from unwrap.comparison.compared_frames import ComparedFrames
+from unwrap.comparison.compared_methods import CPU, Estimate, Look, Method
 from unwrap.depth import expected_calibration_error, score
 from unwrap.signal import Memory, Sensed, Shots, unambiguous_range_m
 from unwrap.support import mapped, on_device
 from unwrap.training import JUDGED_DRAW, acquiring_threads, in_order, loader
 
+SCORED_AT_ONCE = {"cpu": 1, "cuda": 16}
+"""Frames that methods look at together; what methods do is small work for a GPU."""
+TRUSTED = 0.5
+"""Confidence from which on a network remembers what it saw in the frame before."""
+CLASSES = 5
+"""Wrap classes that are told apart: the last is that of all farther wraps. At 24 MHz the first
+four end at 25 m."""
+
 
 @torch.inference_mode()
-def rows_of(
+def score_methods(
     methods: Sequence[Method],
-    frames: SensedFrames,
+    frames: ComparedFrames,
     *,
     device: torch.device = CPU,
     tick: Callable[[int], object] = lambda frames: None,
@@ -36,8 +38,20 @@ def rows_of(
     """A row for each method and number of samples: means over all frames.
 
     The frames come in their order, so that a method which remembers has seen the frame before.
-    `device` is where the networks are; `tick` is told of the frames scored, once for each number
-    of samples.
+
+    Parameters
+    ----------
+    methods : sequence of Method
+    frames : ComparedFrames
+    device : torch.device
+        Where the networks are.
+    tick : callable
+        Told of the frames scored, once for each number of samples.
+
+    Returns
+    -------
+    list of dict
+        `method`, `shots`, `merge`, `frames`, and the mean of every score.
     """
     tallies = {
         (method, shots): _Tally(method, frames)
@@ -52,8 +66,19 @@ def rows_of(
         for order, batch in zip(orders, batches, strict=True):
             sensed, truth = on_device(batch, device)
             scored = frames.scored(order.numbers, draw=JUDGED_DRAW).to(device) & truth.known
+            # What a source remembers is for training; judged methods remember what they saw.
+            alone = replace(sensed, memory=None)
+            looks: dict[Look, Estimate] = {}
             for tally in of_shots:
-                tally.judge(sensed, order.numbers, truth.distance_m, scored)
+                method = tally.method
+                if method.remembers:
+                    tally.add_sequence(alone, order.numbers, truth.distance_m, scored)
+                    continue
+                # A network looks once at a batch, however many rules merge what it sees.
+                if method.look not in looks:
+                    looks[method.look] = method.look(alone, frames.sensor)
+                estimate = method.merged(looks[method.look], alone, frames.sensor)
+                tally.add(estimate, truth.distance_m, scored)
             tick(len(sensed))
     return [
         {"method": method.label, "shots": int(shots), "merge": method.merge, **tally.means()}
@@ -64,8 +89,8 @@ def rows_of(
 class _Tally:
     """What one method made of the frames so far."""
 
-    def __init__(self, method: Method, frames: SensedFrames):
-        self._method, self._frames = method, frames
+    def __init__(self, method: Method, frames: ComparedFrames):
+        self.method, self._frames = method, frames
         self._unambiguous_m = unambiguous_range_m(frames.sensor.f1_hz)
         self._scores: list[dict[str, float]] = []
         self._confidence: list[Tensor] = []
@@ -73,21 +98,15 @@ class _Tally:
         self._last: Estimate | None = None
         self._confusion = torch.zeros(CLASSES, CLASSES, dtype=torch.int64)
 
-    def judge(
+    def add_sequence(
         self, sensed: Sensed, numbers: Sequence[int], truth_m: Tensor, scored: Tensor
     ) -> None:
-        """Let the method look at frames [B], all at once unless it remembers, and score them."""
-        places = [slice(place, place + 1) for place in range(len(numbers))]
-        if self._method.remembers:
-            for place, number in zip(places, numbers, strict=True):
-                shown = replace(mapped(itemgetter(place), sensed), memory=self._memory(number))
-                self._last = self._method.look(shown, self._frames.sensor)
-                self._add(self._last, truth_m[place], scored[place])
-            return
-        shown = sensed if sensed.memory is None else replace(sensed, memory=None)
-        estimate = self._method.look(shown, self._frames.sensor)
-        for place in places:
-            self._add(mapped(itemgetter(place), estimate), truth_m[place], scored[place])
+        """Let the method look at frames [B], each with its own depth of the one before; score."""
+        for place, number in enumerate(numbers):
+            one = slice(place, place + 1)
+            shown = replace(mapped(itemgetter(one), sensed), memory=self._memory(number))
+            self._last = self.method.look(shown, self._frames.sensor)
+            self.add(self._last, truth_m[one], scored[one])
 
     def _memory(self, number: int) -> Memory | None:
         """What the method remembers of the frame before; nothing at the start of a clip."""
@@ -96,9 +115,15 @@ class _Tally:
             return None
         trusted = torch.ones_like(last.depth_m) if last.confidence is None else last.confidence
         seen_m = last.depth_m.masked_fill(trusted < TRUSTED, torch.nan)
-        return on_device(self._frames.moved(seen_m.cpu(), [number]), seen_m.device)
+        return on_device(self._frames.warp(seen_m.cpu(), [number]), seen_m.device)
 
-    def _add(self, estimate: Estimate, truth_m: Tensor, scored: Tensor) -> None:
+    def add(self, estimate: Estimate, truth_m: Tensor, scored: Tensor) -> None:
+        """Score an estimate of frames [B], each by itself."""
+        for place in range(len(truth_m)):
+            one = slice(place, place + 1)
+            self._add_one(mapped(itemgetter(one), estimate), truth_m[one], scored[one])
+
+    def _add_one(self, estimate: Estimate, truth_m: Tensor, scored: Tensor) -> None:
         """Score one frame [1, H, W]; depth that is missing counts as 0."""
         depth_m = estimate.depth_m.nan_to_num(0.0)
         range_m = self._frames.sensor.max_range_m
@@ -111,6 +136,7 @@ class _Tally:
         counts = torch.bincount(true * CLASSES + found, minlength=CLASSES**2)
         self._confusion += counts.view(CLASSES, CLASSES).cpu()
         if estimate.confidence is not None:
+            # All scored pixels are kept for the calibration error: half the memory in 16 bits.
             self._confidence.append(estimate.confidence[scored].clamp(0, 1).half())
             self._right.append(((depth_m - truth_m).abs() < half_m)[scored])
 
@@ -131,10 +157,6 @@ class _Tally:
             confidence, right = torch.cat(self._confidence), torch.cat(self._right)
             means["calibration_error"] = expected_calibration_error(confidence.float(), right)
         return means
-
-
-CLASSES = 5
-"""Wrap classes up to 25 m, and all beyond."""
 
 
 def accuracy_and_precision(

@@ -1,38 +1,37 @@
-"""The results table: every method scored on the same frames with the same noise."""
+"""Every way from samples to depth that the results table compares, behind one interface."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import torch
 from torch import Tensor
 
-from shotenv.dataset import SensedFrames
-from unwrap.comparison.plan import Training
+from unwrap.comparison.catalogue import AMPLITUDE, KERNEL_DENSITY, TWO_FREQUENCIES
+from unwrap.comparison.compared_frames import ComparedFrames
+from unwrap.comparison.table_trainings import Training
 from unwrap.depth import (
+    Merge,
     ReflectancePrior,
     calibrate,
     correct_sensed,
     unwrap_amplitude,
     unwrap_kernel_density,
 )
-from unwrap.networks import Unwrapper
+from unwrap.networks import NetworkName, Unwrapper
 from unwrap.signal import Sensed, SensorDescription, Shots
 from unwrap.support import on_device
 from unwrap.training import acquiring_threads, in_order, loader
 
 FEW = (Shots.TWO, Shots.FOUR)
-TRUSTED = 0.5
-"""Confidence from which on a network remembers what it saw in the frame before."""
+PROBABILITIES: tuple[NetworkName, ...] = ("tofsegnet", "toffusionnet", "phasenet", "chen_net")
+"""Networks whose confidence is the probability that the wrap is right."""
 CALIBRATION_DRAW = 1
 """Draw of the training frames that the reflectance prior is measured on."""
 CALIBRATION_BATCH = 16
 CPU = torch.device("cpu")
-SCORED_AT_ONCE = {"cpu": 1, "cuda": 16}
-"""Frames that methods look at together; what methods do is small work for a GPU."""
 
 
 @dataclass(frozen=True)
@@ -53,64 +52,55 @@ class Method:
     Attributes
     ----------
     label : str
-    merge : str
-        "none": the method's own distance; "floor", "nearest": merged with the wrapped map.
+    merge : "none", "floor" or "nearest"
+        "none": the method's own distance; else how that is merged with the wrapped map.
     shots : sequence of Shots
         What it is judged with.
     look : callable
-        Gives the `Estimate` of a batch of frames.
+        Gives the `Estimate` of a batch of frames before it is merged. Methods with the same `look`
+        share what it gives.
     remembers : bool
         Whether it is given its own depth of the frame before.
     """
 
     label: str
-    merge: str
+    merge: Merge
     shots: Sequence[Shots]
     look: Look
     remembers: bool = False
 
+    def merged(self, own: Estimate, sensed: Sensed, sensor: SensorDescription) -> Estimate:
+        """What the method delivers where `look` gave `own`."""
+        # Left alone: with eight samples `correct_sensed` would put the frequencies' own in its place.
+        if self.merge == "none":
+            return own
+        depth = correct_sensed(sensed, own.depth_m, sensor, merge=self.merge)
+        return replace(own, depth_m=depth.distance_m)
 
-def methods_of(training: Training, network: Unwrapper) -> Iterator[Method]:
+
+def network_methods(training: Training, network: Unwrapper) -> Iterator[Method]:
     """A trained network's own distance, and merged with the wrapped map where it is coarse."""
+    probable = training.config.network in PROBABILITIES
 
-    seen: list[tuple[Sensed, Estimate]] = []
+    def look(sensed: Sensed, sensor: SensorDescription) -> Estimate:
+        found = network.predict_sensed(sensed, sensor)
+        return Estimate(found.distance_m, found.confidence if probable else None)
 
-    def own(sensed: Sensed, sensor: SensorDescription) -> Estimate:
-        # The rules of merging ask for the same frames one after the other.
-        if not (seen and seen[-1][0] is sensed):
-            found = network.predict_sensed(sensed, sensor)
-            probable = training.config.network in PROBABILITIES
-            estimate = Estimate(found.distance_m, found.confidence if probable else None)
-            seen[:] = [(sensed, estimate)]
-        return seen[-1][1]
-
-    def merged(rule: Any) -> Look:
-        def look(sensed: Sensed, sensor: SensorDescription) -> Estimate:
-            found = own(sensed, sensor)
-            depth = correct_sensed(sensed, found.depth_m, sensor, merge=rule)
-            return replace(found, depth_m=depth.distance_m)
-
-        return look
-
-    yield Method(training.label, "none", FEW, own)
+    label = training.label
+    yield Method(label, "none", FEW, look)
     if network.network.needs == "gray":
-        yield from (
-            Method(training.label, rule, FEW, merged(rule)) for rule in ("floor", "nearest")
-        )
+        yield Method(label, "floor", FEW, look)
+        yield Method(label, "nearest", FEW, look)
     if training.config.memory:
-        yield Method(f"{training.label}, with memory", "none", FEW, own, remembers=True)
-
-
-PROBABILITIES = ("tofsegnet", "toffusionnet", "phasenet", "chen_net")
-"""Networks whose confidence is the probability that the wrap is right."""
+        yield Method(f"{label}, with memory", "none", FEW, look, remembers=True)
 
 
 def classical_methods(
-    training_frames: SensedFrames, *, device: torch.device = CPU
+    training_frames: ComparedFrames, *, device: torch.device = CPU
 ) -> Iterator[Method]:
     """What needs no network; the reflectance prior is measured on frames of the training split."""
 
-    def eight(sensed: Sensed, sensor: SensorDescription) -> Estimate:
+    def two_frequencies(sensed: Sensed, sensor: SensorDescription) -> Estimate:
         # The candidate stands, however far the frequencies disagree and however weak the signal.
         lenient = replace(sensor, max_residual_m=math.inf, min_snr=0.0)
         return Estimate(correct_sensed(sensed, None, lenient).distance_m)
@@ -125,7 +115,8 @@ def classical_methods(
         )
         return Estimate(found.depth.distance_m)
 
-    priors = {shots: _prior(training_frames, shots, device) for shots in FEW}
+    # Before any method is judged: a prior takes a pass over the training frames.
+    priors = {shots: _reflectance_prior(training_frames, shots, device) for shots in FEW}
 
     def amplitude(sensed: Sensed, sensor: SensorDescription) -> Estimate:
         found = unwrap_amplitude(
@@ -138,14 +129,14 @@ def classical_methods(
         )
         return Estimate(found.depth.distance_m)
 
-    yield Method("two frequencies, nearest candidate", "none", (Shots.EIGHT,), eight)
-    yield Method(
-        "kernel density (Järemo-Lawin et al. 2016)", "none", (Shots.EIGHT,), kernel_density
-    )
-    yield Method("amplitude (Crabb and Manduchi 2014)", "none", FEW, amplitude)
+    yield Method(TWO_FREQUENCIES.label, "none", (Shots.EIGHT,), two_frequencies)
+    yield Method(KERNEL_DENSITY.label, "none", (Shots.EIGHT,), kernel_density)
+    yield Method(AMPLITUDE.label, "none", FEW, amplitude)
 
 
-def _prior(frames: SensedFrames, shots: Shots, device: torch.device) -> ReflectancePrior:
+def _reflectance_prior(
+    frames: ComparedFrames, shots: Shots, device: torch.device
+) -> ReflectancePrior:
     orders = in_order(frames, CALIBRATION_BATCH, (shots,), draw=CALIBRATION_DRAW)
     batches = loader(frames, orders, threads=acquiring_threads(device))
     return calibrate((on_device(batch, device) for batch in batches), frames.sensor)

@@ -1,20 +1,11 @@
-"""Networks as ONNX: with what comes before and after them, in float32 or quantised."""
+"""What an ONNX file computes: a network with what comes before and after it."""
 
 from __future__ import annotations
 
-import logging
-import tempfile
-import warnings
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from pathlib import Path
-
-import numpy as np
 import torch
 from torch import Tensor, nn
 
 from unwrap.depth import RULES, Merge
-from unwrap.export.export_frames import ExportFrames
 from unwrap.networks import Needs, Prediction, Unwrapper, predict_thinned
 from unwrap.signal import (
     GRAY_FULL_SCALE,
@@ -24,8 +15,6 @@ from unwrap.signal import (
     unambiguous_range_m,
     wrapped_and_valid,
 )
-
-OPSET = 20
 
 
 class Exported(nn.Module):
@@ -50,7 +39,7 @@ class Exported(nn.Module):
         self.sensor, self.merge = sensor, merge
 
     def look(self, sensed: Sensed) -> Prediction:
-        """The network's prediction for frames, which are thinned for it as `Unwrapper.predict_sensed` does.
+        """The network's prediction for frames, thinned for it as `Unwrapper.predict_sensed` does.
 
         In float32 wherever it runs, so that a file does not depend on the machine that wrote it.
         """
@@ -152,7 +141,7 @@ EXPORTED: dict[Needs, type[Exported]] = {"gray": ExportedGray, "samples": Export
 """By what the network looks at."""
 
 
-def exported(unwrapper: Unwrapper, sensor: SensorDescription, merge: Merge) -> Exported:
+def exported_network(unwrapper: Unwrapper, sensor: SensorDescription, merge: Merge) -> Exported:
     """What the file of a network computes, in evaluation mode; see `Exported`."""
     return EXPORTED[unwrapper.network.needs](unwrapper, sensor, merge).eval()
 
@@ -160,130 +149,3 @@ def exported(unwrapper: Unwrapper, sensor: SensorDescription, merge: Merge) -> E
 def fractions(gray: Tensor) -> Tensor:
     """12-bit gray image in [0, 1], float32."""
     return gray.to(torch.float32) / GRAY_FULL_SCALE
-
-
-def to_onnx(
-    exported: Exported, example: Mapping[str, Tensor], metadata: Mapping[str, str]
-) -> bytes:
-    """ONNX file of `exported` for frames of the shapes of `example`."""
-    # Run once beforehand: what the sensor's tables keep must not be kept from a trace.
-    outputs = _computed(exported, example)
-    with _quiet():
-        program = torch.onnx.export(
-            exported,
-            kwargs=dict(example),
-            input_names=list(example),
-            output_names=list(outputs),
-            opset_version=OPSET,
-            dynamo=True,
-            verbose=False,
-        )
-    if program is None:
-        raise RuntimeError("torch gave no ONNX program")
-    return _serialised(program.model_proto, metadata)
-
-
-def quantised(content: bytes, frames: ExportFrames) -> bytes:
-    """The ONNX file `content` with convolutions in 8 bits, calibrated with `frames`.
-
-    Those that see the logarithm of the gray level or the phase, and those that make distances or
-    logits (`outer_convolutions`), stay float32: they are a small part of the work, and 8 bits there
-    cost most of the accuracy.
-    """
-    import onnx
-    from onnxruntime.quantization import CalibrationDataReader, quantize_static
-
-    class Reader(CalibrationDataReader):
-        """Hands out the frames one by one."""
-
-        def __init__(self) -> None:
-            self._inputs = iter(frames.one_by_one())
-
-        def get_next(self) -> dict[str, np.ndarray] | None:
-            """Next frame, None after the last."""
-            inputs = next(self._inputs, None)
-            return None if inputs is None else _arrays(inputs)
-
-    model = onnx.load_from_string(content)
-    metadata = {entry.key: entry.value for entry in model.metadata_props}
-    with _quiet(), tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "int8.onnx"
-        quantize_static(
-            model,
-            path,
-            Reader(),
-            per_channel=True,
-            op_types_to_quantize=["Conv"],
-            nodes_to_exclude=outer_convolutions(model.graph),
-        )
-        return _serialised(onnx.load(path), {**metadata, "quantised": "int8"})
-
-
-def outer_convolutions(graph) -> list[str]:
-    """Convolutions with no other between them and the inputs, or between them and the outputs.
-
-    `graph` is an ONNX graph, whose nodes are in the order of computation.
-    """
-    seen, made = {value.name for value in graph.input}, {value.name for value in graph.output}
-    outer = []
-    for nodes, known, near, far in (
-        (graph.node, seen, "input", "output"),
-        (reversed(graph.node), made, "output", "input"),
-    ):
-        for node in nodes:
-            if known.isdisjoint(getattr(node, near)):
-                continue
-            if node.op_type == "Conv":
-                outer.append(node.name)
-            else:
-                known.update(getattr(node, far))
-    return outer
-
-
-def _serialised(model, metadata: Mapping[str, str]) -> bytes:
-    from onnx import checker, helper
-
-    for node in model.graph.node:
-        node.ClearField("metadata_props")  # Lines of source, by where they lie on this machine.
-    helper.set_model_props(model, dict(metadata))
-    checker.check_model(model)
-    return model.SerializeToString()
-
-
-def run(content: bytes, frames: ExportFrames) -> dict[str, Tensor]:
-    """Outputs [N, H, W] of the ONNX file `content` by name, by onnxruntime on the CPU."""
-    import onnxruntime
-
-    session = onnxruntime.InferenceSession(content, providers=["CPUExecutionProvider"])
-    names = [output.name for output in session.get_outputs()]
-    outputs = [session.run(names, _arrays(inputs)) for inputs in frames.one_by_one()]
-    maps = (torch.from_numpy(np.concatenate(one)) for one in zip(*outputs, strict=True))
-    return dict(zip(names, maps, strict=True))
-
-
-def run_torch(exported: Exported, frames: ExportFrames) -> dict[str, Tensor]:
-    """Outputs [N, H, W] of torch itself by name, in float32."""
-    outputs = [_computed(exported, inputs) for inputs in frames.one_by_one()]
-    return {name: torch.cat([output[name] for output in outputs]) for name in outputs[0]}
-
-
-@torch.inference_mode()
-def _computed(exported: Exported, inputs: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    return exported(**inputs)
-
-
-def _arrays(inputs: Mapping[str, Tensor]) -> dict[str, np.ndarray]:
-    return {name: values.numpy() for name, values in inputs.items()}
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Without what exporters tell of their own insides."""
-    disabled = logging.root.manager.disable
-    logging.disable(logging.WARNING)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        logging.disable(disabled)

@@ -1,0 +1,83 @@
+"""A real camera: what must be known of it to read its recordings and to correct them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from unwrap.depth import Merge
+from unwrap.signal import SensorDescription, WiggleTable, read_wiggle
+
+
+@dataclass(frozen=True)
+class Camera:
+    """How recordings are read and corrected.
+
+    Attributes
+    ----------
+    description : SensorDescription
+        With the stored wiggle tables.
+    bits : int
+        Of the converter.
+    unwrapper : str
+        Name or path of a network; it is loaded where a recording has gray images.
+    merge : "nearest", "floor" or "none"
+    horizontal_fov_deg : float
+        Horizontal field of view.
+    """
+
+    description: SensorDescription
+    bits: int
+    unwrapper: str
+    merge: Merge
+    horizontal_fov_deg: float
+
+
+def camera_of(
+    description: SensorDescription,
+    *,
+    bits: int,
+    unwrapper: str,
+    merge: Merge,
+    horizontal_fov_deg: float,
+    wiggle: Path | None = None,
+    noise_lsb: float | None = None,
+) -> Camera:
+    """Camera with a sensor like `description`, but maybe with tables and dark noise of its own.
+
+    Parameters
+    ----------
+    description : SensorDescription
+        Of the kind of sensor.
+    bits, unwrapper, merge, horizontal_fov_deg
+        See `Camera`.
+    wiggle : Path, optional
+        Tables measured with this camera, at both frequencies, in place of those of its kind.
+    noise_lsb : float, optional
+        Standard deviation of one sample, in place of that of its kind.
+
+    Raises
+    ------
+    ValueError
+        A table that is missing, a field of view or a noise out of range.
+    """
+    if not 1 <= horizontal_fov_deg <= 179:
+        raise ValueError(f"fov_deg is {horizontal_fov_deg:g}; expected 1 to 179 degrees")
+    if wiggle is not None:
+        description = replace(description, wiggle=_tables_at_both(wiggle, description))
+    if noise_lsb is not None:
+        # More noise than the converter's whole range can only be a mistaken unit.
+        if not 0 <= noise_lsb <= 2**bits:
+            raise ValueError(f"noise_lsb is {noise_lsb:g}; expected 0 to {2**bits}")
+        description = replace(description, noise_lsb=noise_lsb)
+    return Camera(description, bits, unwrapper, merge, horizontal_fov_deg)
+
+
+def _tables_at_both(path: Path, sensor: SensorDescription) -> tuple[WiggleTable, WiggleTable]:
+    """Tables of a file at f1 and f2 of `sensor`."""
+    tables = read_wiggle(path)
+    missing = [f"{hz:g}" for hz in (sensor.f1_hz, sensor.f2_hz) if hz not in tables]
+    if missing:
+        known = ", ".join(f"{hz:g}" for hz in tables) or "none"
+        raise ValueError(f"{path}: no table at {', '.join(missing)} Hz; it has {known}")
+    return tables[sensor.f1_hz], tables[sensor.f2_hz]

@@ -1,0 +1,112 @@
+"""What is written of a corrected frame: maps, an image in millimetres, points, a picture."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from unwrap.depth import points_of
+from unwrap.recordings.camera import Camera
+from unwrap.recordings.depth_picture import draw_frame
+from unwrap.recordings.frame_correction import CorrectedFrame
+from unwrap.recordings.images import HIGHEST_MM, depth_png
+from unwrap.recordings.recording import Recording
+from unwrap.support import write_bytes
+
+OUTPUT_FILES = ("depth_m.npy", "valid.npy", "depth_mm.png", "points.ply", "picture.png")
+"""Names of the files of one frame."""
+
+
+def refuse_overwriting(recording: Recording, out: Path) -> None:
+    """Check that no file stands where `write_frames` would write one.
+
+    Raises
+    ------
+    ValueError
+        One stands already; the message names it.
+    """
+    for path in (out / name / file for name in recording.names for file in OUTPUT_FILES):
+        if path.exists():
+            raise ValueError(f"{path} stands already; --overwrite replaces it")
+
+
+def write_frames(
+    frames: Sequence[CorrectedFrame],
+    camera: Camera,
+    out: Path,
+    *,
+    tick: Callable[[], object] = lambda: None,
+) -> dict[str, Any]:
+    """Write the files of every frame, into a folder each where there are several.
+
+    Parameters
+    ----------
+    tick : callable
+        Called after each frame.
+
+    Returns
+    -------
+    dict
+        `shots`, `merge`, and of each of the `frames` its `folder` and `frame_statistics`.
+    """
+    numbers = []
+    for frame in frames:
+        folder = out / frame.recording.names[0]
+        for name, content in encode_frame(frame, camera).items():
+            write_bytes(folder / name, content)
+        numbers.append({"folder": str(folder), **frame_statistics(frame)})
+        tick()
+    shots = int(frames[0].recording.raw.shots)
+    return {"shots": shots, "merge": camera.merge, "frames": numbers}
+
+
+def encode_frame(frame: CorrectedFrame, camera: Camera) -> dict[str, bytes]:
+    """Content of the files of one frame, by their names in `OUTPUT_FILES`."""
+    depth_m, valid = frame.depth.distance_m[0].numpy(), frame.depth.valid[0].numpy()
+    picture = io.BytesIO()
+    draw_frame(frame, camera.description).save(picture, format="PNG")
+    encoded = (
+        _npy(depth_m.astype(np.float32)),
+        _npy(valid),
+        depth_png(depth_m, valid),
+        point_cloud(frame, camera.horizontal_fov_deg),
+        picture.getvalue(),
+    )
+    return dict(zip(OUTPUT_FILES, encoded, strict=True))
+
+
+def _npy(array: np.ndarray) -> bytes:
+    content = io.BytesIO()
+    np.save(content, array, allow_pickle=False)
+    return content.getvalue()
+
+
+def frame_statistics(frame: CorrectedFrame) -> dict[str, float | int]:
+    """Shares of valid and saturated pixels, median distance, pixels beyond what a PNG holds."""
+    distances = frame.depth.distance_m[frame.depth.valid]
+    return {
+        "valid_share": frame.depth.valid.double().mean().item(),
+        "saturated_share": frame.recording.raw.saturated.double().mean().item(),
+        "median_m": distances.median().item(),
+        "pixels_beyond_png": int((distances * 1000 > HIGHEST_MM).sum()),
+    }
+
+
+def point_cloud(frame: CorrectedFrame, horizontal_fov_deg: float) -> bytes:
+    """Binary little-endian PLY of the valid pixels: metres ahead, left and up, gray as colour."""
+    import trimesh
+
+    valid, width = frame.depth.valid[0], frame.depth.valid.shape[-1]
+    # Focal length in pixels: half the image's width lies under half the field of view.
+    focal = width / 2 / math.tan(math.radians(horizontal_fov_deg) / 2)
+    points = points_of(frame.depth.distance_m.double(), focal)[:, 0, valid].T
+    colors = None
+    if frame.recording.gray is not None:
+        level = (frame.recording.gray[0][valid] * 255).round().byte().numpy()
+        colors = np.stack([level, level, level, np.full_like(level, 255)], axis=-1)
+    return trimesh.PointCloud(points.numpy(), colors=colors).export(file_type="ply")

@@ -1,0 +1,73 @@
+"""Recorded samples to depth, frame by frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from torch import Tensor
+
+from unwrap.depth import correct
+from unwrap.networks import load_unwrapper
+from unwrap.recordings.camera import Camera
+from unwrap.recordings.recording import NoUsablePixelError, Recording
+from unwrap.signal import DepthFrame, Sensed
+
+
+@dataclass(frozen=True)
+class CorrectedFrame:
+    """One recorded frame, a batch of one, and what was made of it.
+
+    Attributes
+    ----------
+    recording : Recording
+        Of this frame alone.
+    depth : DepthFrame
+    confidence : float32 [1, H, W] or None
+        The network's; None where none was asked.
+    """
+
+    recording: Recording
+    depth: DepthFrame
+    confidence: Tensor | None
+
+
+def correct_recording(recording: Recording, camera: Camera) -> list[CorrectedFrame]:
+    """Depth of every frame; the network is asked where there are gray images.
+
+    Raises
+    ------
+    ValueError
+        There is no such network, or it was trained for another frequency.
+    NoUsablePixelError
+        A frame without a valid pixel.
+    """
+    unwrapper = None if recording.gray is None else load_unwrapper(camera.unwrapper)
+    frames = []
+    # One at a time: a recording may hold more frames than fit into memory as feature maps.
+    for number in range(len(recording.names)):
+        one, prediction = recording.frame(number), None
+        if unwrapper is not None and one.gray is not None:
+            offset_lsb = None if one.offset_lsb is None else one.offset_lsb.unsqueeze(0)
+            sensed = Sensed(one.gray, one.raw, offset_lsb)
+            prediction = unwrapper.predict_sensed(sensed, camera.description)
+        depth = correct(
+            one.raw,
+            None if prediction is None else prediction.distance_m,
+            camera.description,
+            merge=camera.merge,
+            offset_lsb=one.offset_lsb,
+        )
+        _require_valid(one, depth)
+        confidence = None if prediction is None else prediction.confidence
+        frames.append(CorrectedFrame(one, depth, confidence))
+    return frames
+
+
+def _require_valid(one: Recording, depth: DepthFrame) -> None:
+    if not bool(depth.valid.any()):
+        saturated, pixels = int(one.raw.saturated.sum()), one.raw.saturated.numel()
+        frame = f" in frame {one.names[0]}" if one.names[0] else ""
+        raise NoUsablePixelError(
+            f"no usable pixel{frame}: {saturated} of {pixels} are saturated, the others are "
+            "lost in noise or at odds between the frequencies"
+        )
