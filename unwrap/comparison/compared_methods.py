@@ -71,7 +71,7 @@ class Method:
 
     def merged(self, own: Estimate, sensed: Sensed, sensor: SensorDescription) -> Estimate:
         """What the method delivers where `look` gave `own`."""
-        # Left alone: with eight samples `correct_sensed` would put the frequencies' own in its place.
+        # Left alone: of eight samples `correct_sensed` would make the frequencies' own.
         if self.merge == "none":
             return own
         depth = correct_sensed(sensed, own.depth_m, sensor, merge=self.merge)

@@ -102,7 +102,7 @@ def test_a_network_looks_once_at_a_batch_however_many_rules_merge(frames, tiny_u
     class Counting:
         network = unwrapper.network
 
-        def look(self, sensed, sensor):
+        def predict_sensed(self, sensed, sensor):
             looked.append(len(sensed))
             return unwrapper.predict_sensed(sensed, sensor)
 

@@ -23,7 +23,7 @@ from unwrap.export.onnx_conversion import onnx_outputs, to_onnx, torch_outputs
 from unwrap.export.onnx_graph import exported_network
 from unwrap.networks.network import Settings
 from unwrap.networks.predictor import load_unwrapper
-from unwrap.networks.registry import build
+from unwrap.networks.registry import build_network
 from unwrap.networks.tofsegnet import TofSegNet
 from unwrap.networks.weight_files import save_weights
 from unwrap.signal.frames import RawFrame
@@ -92,7 +92,7 @@ def run(path, **inputs):
 def write_samples_network(path, name="toffusionnet", **metadata):
     """An untrained network that looks at samples, whose predictions vary from pixel to pixel."""
     torch.manual_seed(0)
-    network = build(name, Settings(width=4))
+    network = build_network(name, Settings(width=4))
     last = network.judge[-1] if name == "toffusionnet" else network.head
     last.weight.data.mul_(30.0 if name == "toffusionnet" else 1000.0)
     last.bias.data.zero_()
