@@ -32,8 +32,8 @@ NETWORKS: dict[NetworkName, Entry] = {
     "tofsegnet": Entry("TofSegNet", "gray image", PAPER),
     "toffusionnet": Entry(
         "TofFusionNet (ours)",
-        "gray image, phase, amplitude; with memory also its own depth of the frame before, "
-        "moved by ego motion",
+        "gray image, phase, amplitude; with memory also its own depth of the frame before, moved "
+        "by ego motion",
         "ours",
     ),
     "su_net": Entry(

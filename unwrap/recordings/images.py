@@ -35,7 +35,7 @@ def read_gray16(path: Path) -> np.ndarray:
     """
     try:
         with warnings.catch_warnings():
-            # Pillow only warns of images that would fill the memory; their header tells.
+            # Pillow only warns of images that would fill the memory; here they are refused.
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(path, formats=["PNG"]) as image:
                 if image.mode != "I;16":
