@@ -94,7 +94,14 @@ def drive_of(problem: Problem, seed: int) -> Drive:
     """The first drive of an environment after `reset(seed=seed)`."""
     generator, _ = seeding.np_random(seed)
     bank, config = problem.bank, problem.config
-    return draw_drive(drive_seed(generator), config, problem.clips, bank.height, bank.width)
+    return draw_drive(
+        drive_seed(generator),
+        config,
+        problem.clips,
+        bank.height,
+        bank.width,
+        network=problem.network_work,
+    )
 
 
 def energy_surplus(temperature_k: np.ndarray, laser: LaserConfig) -> np.ndarray:

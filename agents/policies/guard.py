@@ -70,7 +70,6 @@ def largest_rises_k(config: EnvConfig) -> tuple[float, ...]:
         temperature_k=every(laser.trip_k),
         integration_s=every(config.sensor.integration_s[1]),
         frame_period_s=1.0 / config.frame_rate_hz,
-        network_macs=0.0,
     )
     before = start_laser(every(laser.release_k))
     after = laser_step(before, cost, every(laser.ambient_k[1]), laser, 1.0 / config.frame_rate_hz)

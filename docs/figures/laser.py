@@ -22,6 +22,7 @@ from figures.stage import (
 )
 from shotenv.laser import (
     ENERGY_PARTS,
+    NetworkWork,
     ShotCost,
     efficiency_at,
     emitted_power_w,
@@ -46,7 +47,7 @@ def _cost(shots: list[int], temperature_k: torch.Tensor) -> ShotCost:
         temperature_k=temperature_k,
         integration_s=INTEGRATION_S * one,
         frame_period_s=PERIOD_S,
-        network_macs=load_unwrapper("tofregnet").macs(*IMAGE),
+        network=NetworkWork(gray=load_unwrapper("tofregnet").macs(*IMAGE)),
     )
 
 
@@ -68,6 +69,7 @@ def laser_energy() -> Made:
     on_s = 8 * INTEGRATION_S
     by_hand = on_s * (POWER_W / LASER.efficiency + LASER.driver_power_w)
     by_hand += 9 * LASER.readout_energy_j + LASER.static_power_w * PERIOD_S
+    by_hand += LASER.energy_per_mac_j * load_unwrapper("tofregnet").macs(*IMAGE)
     return figure, [
         Row("energy of a frame of 8 DCS", f"{1e3 * by_hand:.2f} mJ", f"{bottom[3]:.2f} mJ")
     ]
@@ -132,7 +134,6 @@ def _trips(panel) -> None:
                 temperature_k=state.temperature_k,
                 integration_s=INTEGRATION_S * one,
                 frame_period_s=PERIOD_S,
-                network_macs=0.0,
             )
             state = laser_step(state, cost, ambient_k, laser, PERIOD_S)
         panel.plot(times, found, color=colour, label=name)

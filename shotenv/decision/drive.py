@@ -10,7 +10,7 @@ from torch import Tensor
 
 from shotenv.bank import Clip
 from shotenv.config import EnvConfig
-from shotenv.laser import ShotCost, shot_cost
+from shotenv.laser import NO_NETWORK, NetworkWork, ShotCost, shot_cost
 from shotenv.sensor import (
     OffsetPattern,
     Purpose,
@@ -74,12 +74,19 @@ class Drive:
 
 
 def draw_drive(
-    seed: int, config: EnvConfig, clips: Sequence[Clip], height: int, width: int
+    seed: int,
+    config: EnvConfig,
+    clips: Sequence[Clip],
+    height: int,
+    width: int,
+    *,
+    network: NetworkWork = NO_NETWORK,
 ) -> Drive:
     """The drive of `seed`, a batch of one.
 
     Laser power and integration time are drawn log-uniformly, the ambient temperature uniformly,
     and the laser starts between ambient and the temperature at which it would be released.
+    `network` is what networks compute in a frame; it counts in `Drive.always_eight`.
     """
     # A stream for each purpose: a longer layout does not change the laser that is drawn.
     layout, body = stream(Purpose.DRIVE, seed, 0), stream(Purpose.DRIVE, seed, 1)
@@ -115,7 +122,7 @@ def draw_drive(
             temperature_k=torch.full_like(laser_power_w, config.laser.trip_k),
             integration_s=integration_s,
             frame_period_s=1.0 / config.frame_rate_hz,
-            network_macs=0,
+            network=network,
         ),
     )
 

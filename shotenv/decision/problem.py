@@ -11,6 +11,7 @@ from torch import Tensor
 from shotenv.bank import Bank, Clip, KeptPredictions, check_fits, keep_predictions, open_bank
 from shotenv.config import EnvConfig
 from shotenv.decision.scenes import Scenes, look_at_scenes
+from shotenv.laser import NetworkWork
 from shotenv.sensor import description_of
 from unwrap.networks import Unwrapper, load_unwrapper
 from unwrap.signal import SensorDescription
@@ -45,8 +46,8 @@ class Problem:
         What is seen of each frame before any sample is taken.
     gray_exposure_s : float64 [N]
         Exposure time of each frame's gray image.
-    network_macs : int
-        Multiply-accumulates of a frame's predictions, by both networks where there are two.
+    network_work : NetworkWork
+        What the networks compute in a frame.
     description : SensorDescription
         What the correction must know of the sensor.
     """
@@ -58,7 +59,7 @@ class Problem:
     fusion: Unwrapper | None
     scenes: Scenes
     gray_exposure_s: Tensor
-    network_macs: int
+    network_work: NetworkWork
     description: SensorDescription
 
     def __reduce__(self):
@@ -89,7 +90,7 @@ def open_problem(config: EnvConfig) -> Problem:
     check_fits(bank, config.sensor, frame_rate_hz=config.frame_rate_hz)
     clips = bank.splits(config.split)
     kept = keep_predictions(bank, gray)
-    networks = [gray] if fusion is None else [gray, fusion]
+    size = bank.height, bank.width
     return Problem(
         config=config,
         bank=bank,
@@ -98,7 +99,9 @@ def open_problem(config: EnvConfig) -> Problem:
         fusion=fusion,
         scenes=look_at_scenes(bank, clips, kept, config.sensor),
         gray_exposure_s=torch.from_numpy(bank.gray_exposure_s),
-        network_macs=sum(network.macs(bank.height, bank.width) for network in networks),
+        network_work=NetworkWork(
+            gray=gray.macs(*size), samples=0.0 if fusion is None else fusion.macs(*size)
+        ),
         description=description,
     )
 

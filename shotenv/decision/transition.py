@@ -61,7 +61,17 @@ def reset(problem: Problem, seeds: Sequence[int]) -> State:
     """Start of the drives with the given seeds, one for each environment of the batch."""
     config, bank = problem.config, problem.bank
     drive = concatenate(
-        [draw_drive(seed, config, problem.clips, bank.height, bank.width) for seed in seeds]
+        [
+            draw_drive(
+                seed,
+                config,
+                problem.clips,
+                bank.height,
+                bank.width,
+                network=problem.network_work,
+            )
+            for seed in seeds
+        ]
     )
     played = torch.zeros(len(seeds), dtype=torch.int64)
     return State(drive, played, start_laser(drive.start_k), Seen.nothing(len(seeds)))
@@ -115,5 +125,5 @@ def cost_of(problem: Problem, drive: Drive, shots: Tensor, temperature_k: Tensor
         temperature_k=temperature_k,
         integration_s=drive.integration_s,
         frame_period_s=problem.frame_period_s,
-        network_macs=problem.network_macs,
+        network=problem.network_work,
     )

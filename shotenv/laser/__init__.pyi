@@ -1,5 +1,7 @@
 from .cost import ENERGY_PARTS as ENERGY_PARTS, ShotCost as ShotCost
 from .energy import (
+    NO_NETWORK as NO_NETWORK,
+    NetworkWork as NetworkWork,
     efficiency_at as efficiency_at,
     emitted_power_w as emitted_power_w,
     shot_cost as shot_cost,

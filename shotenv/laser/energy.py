@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
@@ -15,8 +15,24 @@ from shotenv.laser.cost import ShotCost
 Array = Any
 SECONDS_PER_HOUR = 3600.0
 MOST_SHOTS = 8
-UNWRAPPED_BY_NETWORK = (2, 4)
-"""Numbers of samples that do not unwrap by themselves, and so take a prediction."""
+
+
+class NetworkWork(NamedTuple):
+    """Multiply-accumulates that networks take, each charged in the frames in which it runs.
+
+    Attributes
+    ----------
+    gray : float
+        Of the prediction from the gray image: in every frame, for the observation tells it.
+    samples : float
+        Of a network that looks at the samples: wherever some were taken.
+    """
+
+    gray: float = 0.0
+    samples: float = 0.0
+
+
+NO_NETWORK = NetworkWork()
 
 
 def emitted_power_w(power_w: Array, temperature_k: Array, laser: LaserConfig) -> Array:
@@ -43,18 +59,20 @@ def efficiency_at(temperature_k: Array, laser: LaserConfig) -> Array:
 
 
 @lru_cache(maxsize=64)
-def chip_energies_j(readout_j: float, static_j: float, network_j: float) -> Tensor:
+def chip_energies_j(
+    readout_j: float, static_j: float, gray_network_j: float, samples_network_j: float
+) -> Tensor:
     """What does not depend on the laser, by number of samples, float64 [4, 9], joules.
 
-    Of the readouts, of the imager standing by, of the network, and of all three. As a table,
+    Of the readouts, of the imager standing by, of the networks, and of all three. As a table,
     because a step looks up its row faster than it could work it out.
     """
     rows = []
     for shots in range(MOST_SHOTS + 1):
         # One readout more, of the gray image.
         readouts_j = (shots + 1) * readout_j
-        prediction_j = network_j if shots in UNWRAPPED_BY_NETWORK else 0.0
-        rows.append((readouts_j, static_j, prediction_j, readouts_j + static_j + prediction_j))
+        networks_j = gray_network_j + (samples_network_j if shots else 0.0)
+        rows.append((readouts_j, static_j, networks_j, readouts_j + static_j + networks_j))
     return torch.tensor(rows, dtype=torch.float64).T.contiguous()
 
 
@@ -66,13 +84,13 @@ def shot_cost(
     temperature_k: Tensor,
     integration_s: Tensor,
     frame_period_s: float,
-    network_macs: float,
+    network: NetworkWork = NO_NETWORK,
 ) -> ShotCost:
     """Energy, duty, heat and wear of one frame.
 
     Laser, modulation driver and readouts go with the samples, one readout more with the gray
-    image; the imager's static power with the frame period; a prediction of the network with
-    `UNWRAPPED_BY_NETWORK` samples.
+    image; the imager's static power with the frame period; networks with their predictions, see
+    `NetworkWork`.
 
     Parameters
     ----------
@@ -84,8 +102,8 @@ def shot_cost(
         Of the junction, at the start of the frame.
     frame_period_s : float
         Seconds from frame to frame.
-    network_macs : float
-        Multiply-accumulates of one prediction.
+    network : NetworkWork
+        None by default.
     """
     on_s = shots * integration_s
     electrical_w = optical_power_w / efficiency_at(temperature_k, laser)
@@ -94,7 +112,8 @@ def shot_cost(
     chips = chip_energies_j(
         laser.readout_energy_j,
         laser.static_power_w * frame_period_s,
-        laser.energy_per_mac_j * network_macs,
+        laser.energy_per_mac_j * network.gray,
+        laser.energy_per_mac_j * network.samples,
     )
     readout_j, static_j, network_j, chips_j = chips.index_select(1, shots).unbind()
     wear = ageing_rate(electrical_w, temperature_k, laser)

@@ -14,11 +14,12 @@ from shotenv.config.laser import LaserConfig
 from shotenv.config.reader import ConfigError, find_config, merged, read_config
 from shotenv.config.sensor import SensorConfig
 from shotenv.laser.ageing import ageing_rate
-from shotenv.laser.energy import efficiency_at, emitted_power_w, shot_cost
+from shotenv.laser.energy import NetworkWork, efficiency_at, emitted_power_w, shot_cost
 from shotenv.laser.laser_state import LaserState, laser_step, start_laser, too_bright
 from shotenv.laser.thermal import case_step, junction_step, trip_step
 
 PERIOD_S = 0.1
+NETWORK = NetworkWork(1e9)
 ENERGY_PARTS = ("laser", "driver", "readout", "static", "network")
 
 
@@ -36,7 +37,9 @@ def kelvin(*values):
     return torch.tensor(values, dtype=torch.float64)
 
 
-def cost(laser, shots, power_w=7.0, integration_s=6e-4, macs=1e9, temperature_k=298.15):
+def cost(
+    laser, shots, power_w=7.0, integration_s=6e-4, network=NetworkWork(1e9), temperature_k=298.15
+):
     one = torch.ones(len(shots), dtype=torch.float64)
     return shot_cost(
         torch.tensor(shots),
@@ -45,7 +48,7 @@ def cost(laser, shots, power_w=7.0, integration_s=6e-4, macs=1e9, temperature_k=
         temperature_k=temperature_k * one,
         integration_s=integration_s * one,
         frame_period_s=PERIOD_S,
-        network_macs=macs,
+        network=network,
     )
 
 
@@ -76,7 +79,8 @@ def test_energy_of_each_choice_by_hand(laser):
     for row, shots in enumerate((0, 2, 4, 8)):
         on_s = shots * 6e-4
         laser_j = on_s * 7.0 / 0.42
-        network_j = 1e9 * 1e-12 if shots in (2, 4) else 0.0
+        # Every observation tells the prediction, whatever is taken then.
+        network_j = 1e9 * 1e-12
         total_j = laser_j + 2.1 * on_s + (shots + 1) * 0.26e-3 + 62e-3 * 0.1 + network_j
         assert found.laser_energy_j[row].item() == pytest.approx(laser_j)
         assert found.driver_energy_j[row].item() == pytest.approx(2.1 * on_s)
@@ -86,6 +90,11 @@ def test_energy_of_each_choice_by_hand(laser):
         assert found.energy_j[row].item() == pytest.approx(total_j)
         assert found.duty[row].item() == pytest.approx(on_s / 0.1)
         assert found.heat_j[row].item() == pytest.approx(laser_j - 7.0 * on_s)
+
+
+def test_a_network_that_looks_at_samples_runs_where_there_are_some(laser):
+    found = cost(laser, [0, 2, 4, 8], network=NetworkWork(gray=1e9, samples=3e9))
+    assert found.network_energy_j.tolist() == pytest.approx([1e-3, 4e-3, 4e-3, 4e-3])
 
 
 @pytest.mark.parametrize("temperature_k", [290.0, 320.0, 336.0])

@@ -21,6 +21,7 @@ from shotenv.decision.acquire import acquire_depth
 from shotenv.decision.problem import open_problem
 from shotenv.decision.transition import reset
 from shotenv.env.vector import ShotScheduleVectorEnv
+from shotenv.laser.energy import NetworkWork
 from unwrap.depth.correction import correct
 from unwrap.networks.network import Settings
 from unwrap.networks.predictor import load_unwrapper
@@ -153,7 +154,7 @@ def test_what_is_seen_before_any_sample_is_the_shipped_gray_networks(problem, ti
 def test_both_networks_cost_energy(problem, fusing):
     size = problem.bank.height, problem.bank.width
     used = [load_unwrapper(name).macs(*size) for name in ("tofregnet", fusing["unwrapper"])]
-    assert problem.network_macs == sum(used) and min(used) > 0
+    assert problem.network_work == tuple(used) and min(used) > 0
 
 
 def test_a_gray_networks_prediction_is_the_kept_one(tiny_kwargs):
@@ -163,7 +164,8 @@ def test_a_gray_networks_prediction_is_the_kept_one(tiny_kwargs):
     direct_m = unwrapper.predict(problem.bank.gray(drive.frame(STEP))).distance_m
     assert problem.fusion is None
     assert torch.equal(made.predicted_m, direct_m.to(torch.float16).float())
-    assert problem.network_macs == unwrapper.macs(problem.bank.height, problem.bank.width)
+    work = NetworkWork(gray=unwrapper.macs(problem.bank.height, problem.bank.width))
+    assert problem.network_work == work
 
 
 def test_evaluate_scores_each_acquisitions_own_prediction(fusing, tmp_path, capsys):
