@@ -20,6 +20,7 @@ from shotenv.laser.thermal import case_step, junction_step, trip_step
 
 PERIOD_S = 0.1
 NETWORK = NetworkWork(1e9)
+NETWORK = NetworkWork(gray=1e9)
 ENERGY_PARTS = ("laser", "driver", "readout", "static", "network")
 
 
@@ -37,9 +38,7 @@ def kelvin(*values):
     return torch.tensor(values, dtype=torch.float64)
 
 
-def cost(
-    laser, shots, power_w=7.0, integration_s=6e-4, network=NetworkWork(1e9), temperature_k=298.15
-):
+def cost(laser, shots, power_w=7.0, integration_s=6e-4, network=NETWORK, temperature_k=298.15):
     one = torch.ones(len(shots), dtype=torch.float64)
     return shot_cost(
         torch.tensor(shots),
