@@ -26,7 +26,7 @@ class ColorMap:
     def palette(self) -> np.ndarray:
         """uint8 [256, 3]; the last entry stands for no value."""
         stops = np.linspace(0.0, 1.0, len(self.anchors))
-        channels = np.array([[int(a[i : i + 2], 16) for i in (1, 3, 5)] for a in self.anchors]).T
+        channels = np.array([_rgb(anchor) for anchor in self.anchors]).T
         position = np.linspace(0.0, 1.0, LEVELS)
         colors = np.stack([np.interp(position, stops, channel) for channel in channels], axis=-1)
         return np.vstack([colors.round(), [NO_VALUE_RGB]]).astype(np.uint8)
@@ -56,7 +56,6 @@ GRAY = ("#000000", "#ffffff")
 
 def paint(values: np.ndarray, colors: ColorMap) -> Image.Image:
     """Palette image of `values` [H, W]; what is not finite is drawn in the no-value gray."""
-    # A palette takes one byte a pixel where colours would take three: reports embed many.
     scaled = (values - colors.low) / (colors.high - colors.low) * (LEVELS - 1)
     known = np.isfinite(scaled)
     index = np.where(known, np.clip(np.where(known, scaled, 0.0), 0, LEVELS - 1).round(), LEVELS)
@@ -70,3 +69,7 @@ def picture(values: np.ndarray, colors: ColorMap) -> str:
     content = io.BytesIO()
     paint(values, colors).save(content, format="PNG", optimize=True)
     return "data:image/png;base64," + base64.b64encode(content.getvalue()).decode("ascii")
+
+
+def _rgb(color: str) -> tuple[int, int, int]:
+    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
