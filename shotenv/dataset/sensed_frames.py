@@ -126,6 +126,7 @@ class SensedFrames:
         return self._warp(distance_m, self.frames[list(numbers)])
 
     def _warp(self, distance_m: Tensor, frames: Tensor) -> Memory:
+        """By the ego motion that the bank tells; bank frames where `warp` has numbers."""
         rendered = self.bank.config
         if rendered is None:
             raise ValueError(f"bank {self.bank.folder} has no camera; its depth cannot be warped")
@@ -150,6 +151,7 @@ class SensedFrames:
         return draw_drive(own, self._config, self.bank.clips, height, width)
 
     def _drives(self, frames: Tensor, draw: int) -> Drive:
+        """Of each of the frames; all frames of a clip have the same."""
         seeds = [self.bank.clip_of(index).seed for index in frames.tolist()]
         return concatenate([self._drive(draw, seed) for seed in seeds])
 
@@ -163,6 +165,7 @@ class SensedFrames:
         if shots is None:
             return Sensed(gray)
         exposure, drive = self._exposure(frames), self._drives(frames, draw)
+        # Noise follows from the drive and the place in the clip, so not from the batch.
         places = (frames - self._starts(frames)).tolist()
         noise = noise_samples(drive.seed.tolist(), places, *gray.shape[-2:])
         exposure_s = torch.from_numpy(self.bank.gray_exposure_s)[frames]
@@ -183,6 +186,7 @@ class SensedFrames:
     def _memory(self, frames: Tensor, draw: int, shots: Shots) -> Memory:
         """Depth of the frames before, as a network would have it that unwraps without fault."""
         starts = self._starts(frames)
+        # A clip's first frame has none before: it stands in for it, and is masked below.
         before = torch.maximum(frames - 1, starts)
         sensed = self._sensed(before, draw, shots)
         depth = correct_sensed(sensed, self._true_m(before), self.sensor)
@@ -196,6 +200,7 @@ class SensedFrames:
         return Truth(distance_m, torch.ones_like(distance_m, dtype=torch.bool))
 
     def _true_m(self, frames: Tensor) -> Tensor:
+        """Rendered distance, where the sky and what is too far count as the range."""
         return self._thinned(self.bank.distance_m(frames)).clamp(max=self.range_m)
 
     def _measure_truth(self, index: int) -> Truth:

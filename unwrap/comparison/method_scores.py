@@ -113,8 +113,10 @@ class _Tally:
         last = self._last
         if last is None or not self._frames.follows(number):
             return None
+        # Without a probability there is nothing to tell good depth from bad: all is remembered.
         trusted = torch.ones_like(last.depth_m) if last.confidence is None else last.confidence
         seen_m = last.depth_m.masked_fill(trusted < TRUSTED, torch.nan)
+        # Sources keep their ego motion, and warp, on the processor.
         return on_device(self._frames.warp(seen_m.cpu(), [number]), seen_m.device)
 
     def add(self, estimate: Estimate, truth_m: Tensor, scored: Tensor) -> None:
@@ -128,6 +130,7 @@ class _Tally:
         depth_m = estimate.depth_m.nan_to_num(0.0)
         range_m = self._frames.sensor.max_range_m
         half_m = self._unambiguous_m / 2
+        # The wrap is right where the error is below half a wrap.
         self._scores.append(
             score(depth_m, truth_m, scored, half_m)
             | accuracy_and_precision(depth_m, truth_m, scored, range_m)

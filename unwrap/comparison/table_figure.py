@@ -66,8 +66,10 @@ def _frame_row(
     number: int,
     maps: Mapping[str, ColorMap],
 ) -> Image.Image:
+    """One frame as a row of tiles, under the name of its family."""
     sensed, truth = frames.batch([number], draw=JUDGED_DRAW, shots=Shots.FOUR)
     tiles = [
+        # Gamma 0.5, or night scenes would be black.
         _tile("gray image", sensed.gray.sqrt(), maps["gray"]),
         _tile("truth", truth.distance_m, maps["distance"]),
         _tile("wrapped, 4 DCS", wrapped_distance_m(sensed, frames.sensor), maps["wrapped"]),
@@ -75,6 +77,7 @@ def _frame_row(
     for name, network in networks.items():
         found = network.predict_sensed(sensed, frames.sensor)
         tiles.append(_tile(name, found.distance_m, maps["distance"]))
+        # Networks of the samples have refined the measured distance themselves.
         if network.network.needs == "gray":
             depth = correct_sensed(sensed, found.distance_m, frames.sensor)
             tiles.append(_tile("corrected", depth.distance_m, maps["distance"]))

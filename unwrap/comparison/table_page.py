@@ -63,6 +63,7 @@ def render_page(config: TableConfig, sensor: SensorDescription, rows: Sequence[R
     )
     return template.render(
         config=config.model_dump(mode="json"),
+        # Whoever reads a table of a short training must not take its ranks for those of the papers.
         small=config.width < FULL.width or config.epochs < FULL.epochs or config.stride > 1,
         splits={row["split"] for row in rows},
         truths={row["truth"] for row in rows},

@@ -67,6 +67,7 @@ def make_table(
     if only:
         say(f"{len(networks)} networks stand in {out}")
         return []
+    # They come from their files, into the memory of the processor.
     for unwrapper in networks.values():
         unwrapper.network.to(training_device())
     rows = _score_all(networks, open_splits)

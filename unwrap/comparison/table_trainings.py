@@ -89,6 +89,7 @@ def _training(
 ) -> Training:
     shared = ("bank", "sensor", "stride", "width", "epochs", "batch_size", "learning_rate", "seed")
     values = {name: getattr(config, name) for name in shared} | RECIPES[recipe] | fields
+    # The only network that was made to look at its own depth of the frame before.
     memory = network == "toffusionnet"
     ours = " with our loss" if network in PAPERS and recipe == "ours" else ""
     train_config = TrainConfig(network=network, memory=memory, **values)

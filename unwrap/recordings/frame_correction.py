@@ -43,7 +43,7 @@ def correct_recording(recording: Recording, camera: Camera) -> list[CorrectedFra
     """
     unwrapper = None if recording.gray is None else load_unwrapper(camera.unwrapper)
     frames = []
-    # One at a time: a recording may hold more frames than fit into memory as feature maps.
+    # One at a time: the feature maps of a long recording would not fit into memory.
     for number in range(len(recording.names)):
         one, prediction = recording.frame(number), None
         if unwrapper is not None and one.gray is not None:

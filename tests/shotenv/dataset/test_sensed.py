@@ -1,4 +1,5 @@
 import dataclasses
+from types import SimpleNamespace
 
 import pytest
 import torch
@@ -114,3 +115,23 @@ def test_the_first_frame_of_a_clip_remembers_nothing(bank):
 def test_a_sensor_that_the_bank_was_not_rendered_for_is_refused(bank):
     with pytest.raises(ValueError, match="f1_hz"):
         SensedFrames(bank, bank.frames("train"), env_config(sensor="mlx75027"), range_m=RANGE_M)
+
+
+def test_held_out_families_are_those_of_the_shift_split(bank):
+    frames = frames_of(bank)
+    assert frames.held_out_families == ()
+    clips = [dataclasses.replace(clip, split="shift") for clip in bank.clips[:2]]
+    frames.bank = SimpleNamespace(clips=(*clips, *bank.clips[2:]))
+    assert frames.held_out_families == tuple(clip.family for clip in clips)
+
+
+def test_depth_of_the_frame_before_is_nearer_by_the_way_driven(bank):
+    frames = frames_of(bank)
+    _, truth = frames.batch([1], draw=0, shots=None)
+    warped = frames.warp(truth.distance_m, [1])
+    index = int(frames.frames[1])
+    moves_m = float(bank.ego_speed_m_s[index]) * 0.1
+    seen = warped.known > 0
+    assert seen.float().mean() > 0.5
+    nearer_m = (truth.distance_m - warped.distance_m)[seen].median()
+    assert nearer_m == pytest.approx(moves_m, abs=0.5)
