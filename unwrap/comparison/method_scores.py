@@ -21,7 +21,7 @@ from unwrap.training import JUDGED_DRAW, acquiring_threads, in_order, loader
 SCORED_AT_ONCE = {"cpu": 1, "cuda": 16}
 """Frames that methods look at together; what methods do is small work for a GPU."""
 TRUSTED = 0.5
-"""Confidence from which on a network remembers what it saw in the frame before."""
+"""Confidence from which on a network remembers what it saw in the frame before; assumed."""
 CLASSES = 5
 """Wrap classes that are told apart: the last is that of all farther wraps. At 24 MHz the first
 four end at 25 m."""
@@ -130,21 +130,22 @@ class _Tally:
         depth_m = estimate.depth_m.nan_to_num(0.0)
         range_m = self._frames.sensor.max_range_m
         half_m = self._unambiguous_m / 2
-        # The wrap is right where the error is below half a wrap.
         self._scores.append(
             score(depth_m, truth_m, scored, half_m)
             | accuracy_and_precision(depth_m, truth_m, scored, range_m)
         )
-        true, found = (self._classes(map_m[scored]) for map_m in (truth_m, depth_m))
+        # Besides the error by its own measure: `score` calls the wrap right below half a wrap of
+        # error, the paper's classes are cut at fixed distances.
+        true, found = (
+            (distance_m[scored] / self._unambiguous_m).long().clamp(0, CLASSES - 1)
+            for distance_m in (truth_m, depth_m)
+        )
         counts = torch.bincount(true * CLASSES + found, minlength=CLASSES**2)
         self._confusion += counts.view(CLASSES, CLASSES).cpu()
         if estimate.confidence is not None:
             # All scored pixels are kept for the calibration error: half the memory in 16 bits.
             self._confidence.append(estimate.confidence[scored].clamp(0, 1).half())
             self._right.append(((depth_m - truth_m).abs() < half_m)[scored])
-
-    def _classes(self, distance_m: Tensor) -> Tensor:
-        return (distance_m / self._unambiguous_m).long().clamp(0, CLASSES - 1)
 
     def means(self) -> dict[str, float]:
         """Mean of each number over the frames that have it, and what is counted over all pixels."""

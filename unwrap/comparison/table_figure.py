@@ -32,6 +32,8 @@ from unwrap.pictures import (
 from unwrap.signal import Shots, unambiguous_range_m, wrapped_distance_m
 from unwrap.training import JUDGED_DRAW
 
+LEGEND_GAP_PX, ROW_GAP_PX = 16, 10
+
 
 def draw_frames(
     networks: Mapping[str, Unwrapper], frames: ComparedFrames, numbers: Sequence[int]
@@ -54,9 +56,9 @@ def draw_frames(
         "confidence": ColorMap(0.0, 1.0, "", ERROR),
     }
     rows = [_frame_row(networks, frames, number, maps) for number in numbers]
-    width = rows[0].width // len(maps) - 16
-    legend = line([bar(name, colors, width, 1) for name, colors in maps.items()], gap=16)
-    return framed(column([*rows, legend], gap=10))
+    width = rows[0].width // len(maps) - LEGEND_GAP_PX
+    bars = [bar(name, colors, width, 1) for name, colors in maps.items()]
+    return framed(column([*rows, line(bars, gap=LEGEND_GAP_PX)], gap=ROW_GAP_PX))
 
 
 @torch.inference_mode()

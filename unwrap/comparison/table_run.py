@@ -72,6 +72,7 @@ def make_table(
         unwrapper.network.to(training_device())
     rows = _score_all(networks, open_splits)
     folder = out if page is None else page
+    # The first training planned is always on clips and rendered truth, as the figure needs.
     frames = open_splits(wanted[0].config)("test")
     write_json(folder / NUMBERS, {"config": config.model_dump(mode="json"), "rows": rows})
     write_bytes(folder / PAGE, render_page(config, frames.sensor, rows).encode())

@@ -22,4 +22,4 @@ from .scoring import (
     mean_scores as mean_scores,
     score as score,
 )
-from .warp import move_depth as move_depth, points_of as points_of
+from .warp import focal_px as focal_px, move_depth as move_depth, points_of as points_of

@@ -94,8 +94,9 @@ def unwrap_amplitude(
     first = decode_at(0, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
     depth_m = candidates_m(first.phase_rad, sensor.f1_hz, sensor.max_range_m)
     cost = wrap_costs(depth_m, first, raw.saturated, sensor, prior, noise)
-    weight = first.amplitude.add(noise).log()
-    beliefs = min_sum(cost, depth_m, weight, smoothness)
+    # Noise is added, or the logarithm would see an edge between any two dark pixels.
+    log_amplitude = first.amplitude.add(noise).log()
+    beliefs = min_sum(cost, depth_m, log_amplitude, smoothness)
     confidence, wraps = beliefs.neg().softmax(1).max(1)
     return depth_with_confidence(
         chosen(depth_m, wraps),
@@ -121,6 +122,7 @@ def wrap_costs(
     The first term fades where the amplitude drowns in noise, and is 0 where it is clipped.
     """
     amplitude = first.amplitude.unsqueeze(1)
+    # 0 in the dark, near 1 for strong signals: a Wiener filter's share of power that is signal.
     power = first.amplitude.square()
     trust = (power / (power + torch.as_tensor(noise).square())).where(~saturated, 0.0)
     likely = prior.log_density(amplitude * depth_m.square())
@@ -128,7 +130,7 @@ def wrap_costs(
     return cost.masked_fill(depth_m > sensor.max_range_m, BEYOND)
 
 
-def min_sum(cost: Tensor, depth_m: Tensor, logarithm: Tensor, smoothness: Smoothness) -> Tensor:
+def min_sum(cost: Tensor, depth_m: Tensor, log_amplitude: Tensor, smoothness: Smoothness) -> Tensor:
     """Beliefs [B, N, H, W]: cost of each wrap with the best of its neighbours', theirs included.
 
     Loopy min-sum belief propagation on the 4-connected grid, sequentially along rows, then along
@@ -138,19 +140,21 @@ def min_sum(cost: Tensor, depth_m: Tensor, logarithm: Tensor, smoothness: Smooth
     ----------
     cost, depth_m : float [B, N, H, W]
         Cost and distance of each wrap.
-    logarithm : float [B, H, W]
-        Logarithm of the amplitude, which tells edges.
+    log_amplitude : float [B, H, W]
+        Its steps tell edges, across which neighbours may differ at less cost.
     """
     # Axis of the sweep first: one step goes from a line to the next, for all K pixels of a line at
     # once, [L, B, N, K].
     columns, rows = (3, 0, 1, 2), (2, 0, 1, 3)
     edges = {
-        order: _edges(depth_m.permute(order), logarithm.unsqueeze(1).permute(order), smoothness)
+        order: _edges(depth_m.permute(order), log_amplitude.unsqueeze(1).permute(order), smoothness)
         for order in (columns, rows)
     }
     incoming = {order: torch.zeros_like(cost) for order in (columns, rows)}
     for _ in range(smoothness.rounds):
         for order, other in ((columns, rows), (rows, columns)):
+            # Of what was said before only the other axis: messages along this one would hear
+            # their own echo.
             lines, edge = (cost + incoming[other]).permute(order), edges[order]
             forth = _messages(lines, edge)
             # The way back is the way forth through everything reversed.
@@ -159,10 +163,10 @@ def min_sum(cost: Tensor, depth_m: Tensor, logarithm: Tensor, smoothness: Smooth
     return cost + incoming[columns] + incoming[rows]
 
 
-def _edges(depth_m: Tensor, logarithm: Tensor, smoothness: Smoothness) -> Tensor:
+def _edges(depth_m: Tensor, log_amplitude: Tensor, smoothness: Smoothness) -> Tensor:
     """Costs of the wraps of neighbouring lines, [L - 1, B, N of the first, N of the second, K]."""
     apart = (depth_m[:-1].unsqueeze(3) - depth_m[1:].unsqueeze(2)).abs_()
-    alike = torch.exp(-logarithm.diff(dim=0).abs() / smoothness.edge).unsqueeze(2)
+    alike = torch.exp(-log_amplitude.diff(dim=0).abs() / smoothness.edge).unsqueeze(2)
     return apart.clamp_(max=smoothness.largest_m).mul_(smoothness.per_m * alike)
 
 

@@ -46,6 +46,7 @@ def candidates_m(phase_rad: Tensor, frequency_hz: float, max_range_m: float) -> 
     tensor([ 0.0000,  6.2457, 12.4914, 18.7370, 24.9827])
     """
     unambiguous_m = unambiguous_range_m(frequency_hz)
+    # Whole wraps rather than the candidates within the range, whose number differs by pixel.
     wraps = torch.arange(math.floor(max_range_m / unambiguous_m) + 1, device=phase_rad.device)
     return distance_m(phase_rad, frequency_hz).unsqueeze(1) + wraps.view(-1, 1, 1) * unambiguous_m
 

@@ -15,7 +15,7 @@ from torch.nn import functional
 
 BINS = 15
 TEMPERATURES = (0.05, 20.0)
-"""Range that a temperature is sought in."""
+"""Range that a temperature is sought in; assumed."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,7 @@ def reliability(confidence: Tensor, right: Tensor, *, bins: int = BINS) -> Relia
         raise ValueError(f"bins is {bins}; expected at least 1")
     values = confidence.detach().flatten().double()
     place = (values * bins).long().clamp(max=bins - 1)
+    # Empty bins divide 0 by 0: the NaN says that they have no mean.
     counts = torch.bincount(place, minlength=bins)
     sums = torch.bincount(place, values, minlength=bins)
     hits = torch.bincount(place, right.flatten().double(), minlength=bins)

@@ -68,9 +68,11 @@ def unwrap_dual(
         # The last wrap ends beyond the range: only the nearer part of its distances is considered.
         fits = wrapped1_m < max_range_m - last * range1_m
         wraps = torch.where(fits, wraps, _best_wraps(gap, range1_m / range2_m, last))
+    # What is left over the nearest whole wrap of f2: the disagreement of the chosen pair.
     best = gap.add_(wraps, alpha=range1_m / range2_m)
     best.sub_(best.round())
     share2 = f2_hz**2 / (f1_hz**2 + f2_hz**2)
+    # (1 - share2) d1 + share2 d2 = d1 - share2 (d1 - d2); the second distance is never formed.
     fused_m = wrapped1_m.add_(wraps, alpha=range1_m).sub_(best, alpha=share2 * range2_m)
     return fused_m.clamp_(min=0), best.abs_().mul_(range2_m)
 

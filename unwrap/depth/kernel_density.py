@@ -39,27 +39,32 @@ from unwrap.signal import (
 class KernelDensity:
     """Parameters of the vote.
 
+    Defaults are those of libfreenect2 for the Kinect v2 where nothing else is said; "assumed" ones
+    were not measured.
+
     Attributes
     ----------
     hypotheses : int
-        Likeliest wrap hypotheses kept per pixel; the paper tries two and three.
+        Likeliest wrap hypotheses kept per pixel; the paper tries two and three, libfreenect2 keeps
+        two.
     radius : int
         Neighbours reach so many pixels; 5 is the paper's window of 11 x 11.
     spread_px : float
-        Standard deviation of the spatial weight.
+        Standard deviation of the spatial weight; assumed, half the radius.
     kernel_m : float
-        Standard deviation of the kernel over distances; about 0.3 m for the Kinect, whose
+        Standard deviation of the kernel over distances; assumed. About 0.3 m for the Kinect, whose
         frequencies are higher and whose distances therefore scatter less.
     mismatch_scale : float
         Variance of the normalised phase mismatch at which a hypothesis counts exp(-1/2).
     phase_scale_rad2 : float
         Sum of phase variances at which a pixel counts exp(-1/2).
     systematic_m : float
-        Standard deviation of the mismatch that noise does not explain: wiggle, motion, multipath.
+        Standard deviation of the mismatch that noise does not explain, wiggle, motion, multipath;
+        assumed.
     least_weight : float
-        Weight of a neighbourhood below which its confidence falls.
+        Weight of a neighbourhood below which its confidence falls; assumed.
     min_confidence : float
-        Confidence from which on a pixel is valid.
+        Confidence from which on a pixel is valid; assumed. libfreenect2 takes 0.5.
     """
 
     hypotheses: int = 3
@@ -124,6 +129,7 @@ def _hypotheses(
 ) -> tuple[Tensor, Tensor]:
     """The likeliest distances and their weights, both [B, hypotheses, H, W], likeliest first."""
     range2_m = unambiguous_range_m(sensor.f2_hz)
+    # Each candidate of f1 with its nearest one of f2: what rounding leaves is their mismatch.
     first_m = candidates_m(first.phase_rad, sensor.f1_hz, sensor.max_range_m)
     gap = (first_m - distance_m(second.phase_rad, sensor.f2_hz).unsqueeze(1)) / range2_m
     mismatch_m = (gap - gap.round()) * range2_m
@@ -169,6 +175,7 @@ def kernel_density(depth_m: Tensor, weight: Tensor, parameters: KernelDensity) -
     steps = torch.arange(-reach, reach + 1)
     gauss = torch.exp(-0.5 * (steps / parameters.spread_px).square())
     line = (gauss / gauss.sum()).tolist()
+    # The kernel over distances keeps the sum from being a convolution; it is a sum over shifts.
     votes, total = torch.zeros_like(depth_m), torch.zeros_like(depth_m[:, :1])
     # One shifted image after the other: all at once would take as many times the memory.
     for y, of_row in enumerate(line):

@@ -51,7 +51,10 @@ def merge_regression(
 def merge_segmentation(
     wraps: Tensor, wrapped_m: Tensor, unambiguous_m: float, saturation_m: float
 ) -> Tensor:
-    """Eq. 8: class d_u + d_M1 where d_M1 < d_sat, else class d_u."""
+    """Eq. 8: class d_u + d_M1 where d_M1 < d_sat, else class d_u; `wraps` are the classes 0, 1, ...
+
+    No line of `RULES`: distances within a class (`class_depth_m`) and "floor" say the same.
+    """
     return _add_wraps(wraps, wrapped_m, unambiguous_m, wraps * unambiguous_m, saturation_m)
 
 
@@ -81,7 +84,7 @@ def merge_none(
     predicted_m: Tensor, wrapped_m: Tensor, unambiguous_m: float, saturation_m: float
 ) -> Tensor:
     """The prediction as it is: of networks that have seen the samples and refine each distance."""
-    # A copy, as of the other rules: who changes the result must not change the prediction.
+    # A copy, as the other rules give one: who changes it must not change the prediction.
     return predicted_m.clone()
 
 

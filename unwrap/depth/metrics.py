@@ -9,6 +9,7 @@ near 0.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 
 import torch
 from torch import Tensor
@@ -55,49 +56,32 @@ def depth_metrics(prediction_m: Tensor, truth_m: Tensor, valid: Tensor) -> dict[
     if valid.dtype != torch.bool:
         raise ValueError(f"valid is {valid.dtype}; expected torch.bool")
     used = valid & (truth_m >= MIN_DEPTH_M)
-    # Squares of float32 would lose digits where errors are small beside the depth.
+    # In float64: squares of float32 would lose digits where errors are small beside the depth.
     images = [
-        _image_metrics(prediction.clamp(min=MIN_DEPTH_M).double(), truth.double())
+        (prediction.clamp(min=MIN_DEPTH_M).double(), truth.double())
         for prediction, truth in (
             (prediction_m[i][used[i]], truth_m[i][used[i]]) for i in range(len(used))
         )
         if len(truth)
     ]
     if not images:
-        return dict.fromkeys(NAMES, math.nan)
-    means = torch.tensor(images, dtype=torch.float64).mean(0).tolist()
-    return dict(zip(NAMES, means, strict=True))
+        return dict.fromkeys(METRICS, math.nan)
+    values = [[float(metric(*image)) for metric in METRICS.values()] for image in images]
+    means = torch.tensor(values, dtype=torch.float64).mean(0).tolist()
+    return dict(zip(METRICS, means, strict=True))
 
 
-NAMES = (
-    "mae_m",
-    "rmse_m",
-    "irmse_per_km",
-    "abs_rel",
-    "sq_rel_kitti",
-    "sq_rel_eigen",
-    "silog",
-    "within_0p1m",
-    "within_0p5m",
-    "p95_m",
-)
-"""Keys of `depth_metrics`, in order."""
-
-
-def _image_metrics(prediction: Tensor, truth: Tensor) -> list[float]:
-    error = prediction - truth
-    absolute, squared = error.abs(), error.square()
-    logarithmic = truth.log() - prediction.log()
-    values = (
-        absolute.mean(),
-        squared.mean().sqrt(),
-        1000 * (1 / truth - 1 / prediction).square().mean().sqrt(),
-        (absolute / truth).mean(),
-        (squared / truth.square()).mean(),
-        (squared / truth).mean(),
-        100 * logarithmic.var(correction=0).sqrt(),
-        (absolute <= 0.1).double().mean(),
-        (absolute <= 0.5).double().mean(),
-        absolute.quantile(0.95),
-    )
-    return [float(value) for value in values]
+METRICS: Mapping[str, Callable[[Tensor, Tensor], Tensor]] = {
+    "mae_m": lambda p, t: (p - t).abs().mean(),
+    "rmse_m": lambda p, t: (p - t).square().mean().sqrt(),
+    "irmse_per_km": lambda p, t: 1000 * (1 / t - 1 / p).square().mean().sqrt(),
+    "abs_rel": lambda p, t: ((p - t).abs() / t).mean(),
+    "sq_rel_kitti": lambda p, t: ((p - t).square() / t.square()).mean(),
+    "sq_rel_eigen": lambda p, t: ((p - t).square() / t).mean(),
+    # mean(l^2) - mean(l)^2 is the variance, which does not come out negative by rounding.
+    "silog": lambda p, t: 100 * (t.log() - p.log()).var(correction=0).sqrt(),
+    "within_0p1m": lambda p, t: ((p - t).abs() <= 0.1).double().mean(),
+    "within_0p5m": lambda p, t: ((p - t).abs() <= 0.5).double().mean(),
+    "p95_m": lambda p, t: (p - t).abs().quantile(0.95),
+}
+"""Metrics of one image by name, of its predicted and true distances (float64 [N], metres)."""

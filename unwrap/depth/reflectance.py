@@ -19,13 +19,13 @@ from unwrap.signal import (
 )
 
 LOWEST, HIGHEST, BINS = math.log(1e-4), math.log(10.0), 96
-"""Natural logarithms of the reflectances told apart, and bins between them."""
+"""Natural logarithms of the reflectances told apart, and bins between them; assumed."""
 BRIGHTEST = 0.98
-"""Quantile of A d^2 that passes for a reflectance of 1: a few brighter surfaces shine back."""
+"""Quantile of A d^2 that passes for a reflectance of 1; assumed. A few surfaces shine back more."""
 MIN_SNR = 3.0
-"""Amplitude over noise from which on a pixel counts."""
+"""Amplitude over noise from which on a pixel counts; assumed."""
 MIN_DISTANCE_M = 0.3
-"""Nearer surfaces do not count: lens and laser are no longer one point."""
+"""Nearer surfaces do not count (assumed): lens and laser are no longer one point."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +101,7 @@ def calibrate(
         wraps.append((truth.distance_m[inside] / unambiguous_range_m(sensor.f1_hz)).long())
     if not strengths or not sum(map(len, strengths)):
         raise ValueError("frames hold no pixel of known distance and enough signal")
+    # From here on in logarithms, in which a factor on all amplitudes is a shift of the histogram.
     logarithm = torch.cat(strengths).log()
     # torch.quantile takes no more than 16 million values.
     scale = logarithm.kthvalue(max(1, round(BRIGHTEST * len(logarithm)))).values
@@ -112,5 +113,6 @@ def calibrate(
 
 def _shares(counts: Tensor) -> tuple[float, ...]:
     """Counts to probabilities; a thousandth of the mean is added to each, so that none is 0."""
+    # The prior's logarithm is taken, and what training frames lack may still be seen in others.
     values = counts.double() + counts.double().mean() * 1e-3
     return tuple((values / values.sum()).tolist())

@@ -58,8 +58,7 @@ def move_depth(
         raise ValueError(f"horizontal_fov_deg is {horizontal_fov_deg}; expected between 0 and 180")
     known = distance_m.isfinite() & (distance_m > 0)
     height, width = distance_m.shape[-2:]
-    # Focal length in pixels: half the image's width lies under half the field of view.
-    focal = width / 2 / math.tan(math.radians(horizontal_fov_deg) / 2)
+    focal = focal_px(width, horizontal_fov_deg)
     points = points_of(torch.where(known, distance_m, 0), focal)
     # [1, 1, 1] or [B, 1, 1], of the type and on the device of the points.
     forward, yaw = (
@@ -73,8 +72,19 @@ def move_depth(
     return splat(torch.stack((ahead, left, up)).square().sum(0).sqrt(), place, seen)
 
 
+def focal_px(width: int, horizontal_fov_deg: float) -> float:
+    """Focal length in pixels: half the image's width lies under half the field of view.
+
+    Examples
+    --------
+    >>> round(focal_px(320, 90.0), 6)
+    160.0
+    """
+    return width / 2 / math.tan(math.radians(horizontal_fov_deg) / 2)
+
+
 def points_of(distance_m: Tensor, focal: float) -> Tensor:
-    """Points [3, B, H, W], ahead, left and up, at radial distances [B, H, W]; `focal` in pixels."""
+    """Points [3, B, H, W], ahead, left and up, at radial distances [B, H, W]; see `focal_px`."""
     height, width = distance_m.shape[-2:]
     left = ((width - 1) / 2 - torch.arange(width).to(distance_m)) / focal
     up = ((height - 1) / 2 - torch.arange(height).to(distance_m)) / focal
@@ -108,7 +118,7 @@ def splat(distance_m: Tensor, place: Tensor, seen: Tensor) -> Memory:
 
     Holes a pixel wide are bridged.
     """
-    # Points that are not seen are offered at infinity, where they never win.
+    # A depth buffer. Points that are not seen are offered at infinity, where they never win.
     offered = torch.where(seen, distance_m, torch.inf).flatten(1)
     nearest = torch.full_like(offered, torch.inf)
     nearest = nearest.scatter_reduce(1, place.flatten(1), offered, "amin").view_as(distance_m)

@@ -19,7 +19,8 @@ from unwrap.support import write_bytes
 
 CHECKED_FRAMES, CALIBRATION_FRAMES = 16, 32
 LEAST_SAME_WRAPS = 0.999
-"""Share of pixels that must have torch's own wrap."""
+"""Share of pixels that must have torch's own wrap; assumed. Not 1: half way between two candidates
+rounding decides."""
 
 
 class CheckedExport:

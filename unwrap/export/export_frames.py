@@ -128,7 +128,7 @@ def made_up_frames(
         Samples of each frame, two or four, for a network that looks at them; None for one that
         looks at the gray image alone.
     """
-    # 12 decorrelates the two splits that are ever asked for.
+    # Two fixed seeds: what a file is calibrated with must not be what it is checked with.
     generator = torch.Generator().manual_seed(12 if split == "train" else 0)
     light, far = (_clouds(count, size, generator) for _ in range(2))
     gray = (GRAY_FULL_SCALE * torch.sigmoid(2.0 * light - 1.0)).round().to(torch.uint16)
@@ -149,7 +149,10 @@ def made_up_frames(
 def _made_up_samples(
     gray: Tensor, phase_rad: Tensor, strength: Tensor, shots: Shots, generator: torch.Generator
 ) -> Sensed:
-    """Converter words of sines, `strength` 0..1 [N, H, W] strong; light in the gray adds noise."""
+    """Converter words of sines, `strength` 0..1 [N, H, W] strong; light in the gray adds noise.
+
+    Offset, noise, drift and the strongest signal are assumed.
+    """
     fractions = gray.to(torch.float32) / GRAY_FULL_SCALE
     offset_lsb = 3.0 * torch.randn(gray.shape, generator=generator)
     noise_lsb = (2.0 + 100.0 * fractions).sqrt()

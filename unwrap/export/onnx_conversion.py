@@ -47,7 +47,7 @@ def quantised_onnx(content: bytes, frames: ExportFrames) -> bytes:
     logits (`outer_convolutions`), stay float32: they are a small part of the work, and 8 bits there
     cost most of the accuracy.
     """
-    import onnx
+    import onnx  # Here and below: optional packages, which only exports need.
     from onnxruntime.quantization import CalibrationDataReader, quantize_static
 
     class Reader(CalibrationDataReader):
@@ -62,6 +62,7 @@ def quantised_onnx(content: bytes, frames: ExportFrames) -> bytes:
             return None if inputs is None else _arrays(inputs)
 
     model = onnx.load_from_string(content)
+    # Taken over by hand, since the quantiser makes a model of its own.
     metadata = {entry.key: entry.value for entry in model.metadata_props}
     with _quiet(), tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "int8.onnx"

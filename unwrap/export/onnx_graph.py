@@ -54,6 +54,7 @@ class Exported(nn.Module):
 
     def wraps(self, distance_m: Tensor, wrapped_m: Tensor) -> Tensor:
         """Whole unambiguous ranges from `wrapped_m` to `distance_m`, rounded; int32 [1, H, W]."""
+        # Rounded: pixels that are not trusted keep a prediction, which is no wrap candidate.
         turns = (distance_m - wrapped_m) / unambiguous_range_m(self.sensor.f1_hz)
         return turns.round().clamp(min=0).to(torch.int32)
 

@@ -47,6 +47,7 @@ def convolution(
     inputs: int, outputs: int, *, kernel: int = 3, stride: int = 1, active: bool = True
 ) -> nn.Sequential:
     """Convolution without bias, batch normalisation and, where `active`, a ReLU."""
+    # Without bias: the normalisation behind would subtract it.
     layers = [
         nn.Conv2d(inputs, outputs, kernel, stride, kernel // 2, bias=False),
         nn.BatchNorm2d(outputs),
@@ -82,6 +83,8 @@ class Autoencoder(Network):
         self.width = width = settings.width
         channels = (width, 2 * width, 4 * width, 8 * width)
         self.stem = convolution(inputs, width, kernel=7, stride=2)
+        # Each stage takes what the one before gives, the first what the stem gives: one entry more
+        # on the left, which is why the lengths differ.
         self.encoder = nn.ModuleList(
             stage(inputs, outputs, stride)
             for inputs, outputs, stride in zip(
@@ -93,7 +96,8 @@ class Autoencoder(Network):
         decoded = (8 * width, 4 * width, 2 * width, width, width // 2)
         self.up = nn.ModuleList(map(doubling, decoded[:-1], decoded[1:]))
         self.plain = nn.ModuleList(map(convolution, map(add, decoded[1:], skips), decoded[1:]))
-        # The last doubling rearranges channels into 2 x 2 pixels.
+        # The last doubling rearranges channels into 2 x 2 pixels: a transposed convolution there
+        # would compute at full resolution.
         self.head = nn.Conv2d(width // 2, 4 * outputs, 1)
 
     def forward(self, images: Tensor) -> Tensor:

@@ -14,8 +14,6 @@ from torch import Tensor
 
 EQUATION_7 = (0.5, 0.4, 0.1)
 """Weights of the scale-invariant, similarity and depth-guided terms."""
-
-
 IGNORED = -100
 """Class of a pixel that `torch.nn.functional.cross_entropy` leaves out."""
 
@@ -61,12 +59,24 @@ def depth_guided_loss(prediction: Tensor, truth: Tensor, known: Tensor | None = 
 
     At least one pixel is used. Pixels that are not `known` (bool [B, H, W]) are never the farthest;
     where an image has fewer known ones than N, the others count as no difference.
+
+    Examples
+    --------
+    Of 20 x 10 pixels the two farthest count; only one is known, and its difference is 4:
+
+    >>> truth = torch.full((1, 20, 10), 5.0)
+    >>> known = torch.zeros(1, 20, 10, dtype=torch.bool)
+    >>> known[0, 0, 0] = True
+    >>> depth_guided_loss(truth + 4, truth, known)
+    tensor(8.)
     """
     height, width = truth.shape[-2:]
     count = max(1, (width // 10) * (height // 10))
-    ranked = truth if known is None else truth.masked_fill(~known, -torch.inf)
+    ranked, difference = truth, truth - prediction
+    if known is not None:
+        ranked, difference = truth.masked_fill(~known, -torch.inf), difference.where(known, 0.0)
     places = ranked.flatten(1).topk(count, dim=1, sorted=False).indices
-    return (truth - prediction).flatten(1).gather(1, places).square().mean()
+    return difference.flatten(1).gather(1, places).square().mean()
 
 
 def ssim_loss(prediction: Tensor, truth: Tensor, data_range: float = 1.0) -> Tensor:
@@ -76,23 +86,18 @@ def ssim_loss(prediction: Tensor, truth: Tensor, data_range: float = 1.0) -> Ten
     """
     if min(truth.shape[-2:]) < 11:
         raise ValueError(f"image is {tuple(truth.shape[-2:])}; the similarity window needs 11 x 11")
+    # The constants of the paper, which keep the quotients from 0 / 0.
     c1, c2 = (0.01 * data_range) ** 2, (0.03 * data_range) ** 2
     moments = torch.stack((prediction, truth, prediction**2, truth**2, prediction * truth), 1)
-    mean_p, mean_t, square_p, square_t, product = _blur(moments).unbind(1)
+    # The window is separable: a matrix product along each axis, without padding.
+    height, width = truth.shape[-2:]
+    blurred = _windows(height, moments) @ moments @ _windows(width, moments).T
+    mean_p, mean_t, square_p, square_t, product = blurred.unbind(1)
     variances = (square_p - mean_p**2) + (square_t - mean_t**2)
     covariance = product - mean_p * mean_t
     luminance = (2 * mean_p * mean_t + c1) / (mean_p**2 + mean_t**2 + c1)
     structure = (2 * covariance + c2) / (variances + c2)
     return 1 - (luminance * structure).mean()
-
-
-def _blur(images: Tensor) -> Tensor:
-    """Gaussian window over the last two axes, without padding.
-
-    It is separable: a matrix product along each axis.
-    """
-    height, width = images.shape[-2:]
-    return _windows(height, images) @ images @ _windows(width, images).T
 
 
 def _windows(length: int, like: Tensor) -> Tensor:

@@ -55,6 +55,7 @@ class Settings:
     f1_hz: float = 24e6
 
     def __post_init__(self) -> None:
+        # Bounds far beyond what is in use, so that a forged file cannot ask for all memory.
         for name, low, high in (("width", 4, 128), ("classes", 2, 16)):
             value = getattr(self, name)
             if not (isinstance(value, int) and low <= value <= high):
@@ -115,6 +116,8 @@ class Network(nn.Module):
     def example(self, height: int, width: int) -> Tensor:
         """Features of a blank frame [1, C, H, W]."""
         blank = torch.zeros(1, height, width, device=next(self.parameters()).device)
+        # Four samples, whatever is looked at: who needs none ignores them. Noise is 1, as
+        # signal-to-noise divides by it.
         raw = RawFrame(blank.unsqueeze(1).expand(-1, 4, -1, -1), blank.bool())
         sensed = Sensed(blank, raw, noise_lsb=blank + 1)
         return self.features(sensed, SensorDescription(f1_hz=self.settings.f1_hz))

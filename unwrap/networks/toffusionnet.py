@@ -41,6 +41,7 @@ LEAST_ALONG = 0.01
 """Least component along the measured phase; its inverse bounds the gradient."""
 KNOTS_PER_WRAP = 2
 """Knots of a curve in each unambiguous range."""
+# Assumed, like all numbers down to `SPOILT`.
 COARSE_WEIGHT = 0.2
 """Weight of the loss of the whole curve beside that of the wrap candidates."""
 CORRECTION_WEIGHT = 0.5
@@ -133,6 +134,7 @@ class TofFusionNet(Autoencoder):
         wraps = true_wraps(truth.distance_m, wrapped_m, self.settings)
         scored = truth.known & valid
         candidates = candidate_scores(scores, wrapped_m, unambiguous_m)
+        # Summed and divided here: cross_entropy's own mean is NaN where no pixel is scored.
         wrap = functional.cross_entropy(
             candidates, wraps.masked_fill(~scored, IGNORED), reduction="sum"
         ) / scored.sum().clamp(min=1)
@@ -159,6 +161,7 @@ class TofFusionNet(Autoencoder):
         wrapped_m, valid = wrapped_and_valid(sensed, sensor)
         scores, correction_m = self.parts(output, wrapped_m)
         coarse_m = mean_distance_m(scores, unambiguous_m)
+        # The curve is looked up where the pixel is taken to be: at its phase, or at the mean.
         place_m = torch.where(valid, wrapped_m, coarse_m.remainder(unambiguous_m))
         logits = candidate_scores(scores, place_m, unambiguous_m)
         probability = (logits / self.temperature[_temperature_index(sensed)]).softmax(1)
@@ -287,6 +290,8 @@ def spoil_memory(memory: Memory, unambiguous_m: float) -> Memory:
     batch, height, width = memory.known.shape
     device = memory.known.device
     kept = (torch.rand(batch, 1, 1, device=device) >= FORGOTTEN).float()
+    # One number decides what becomes of a block, so that none has two faults: below `SPOILT` it is
+    # erased, below twice that moved nearer, in the last such share moved farther.
     fate = torch.rand(batch, 1, *BLOCKS, device=device)
     fate = functional.interpolate(fate, (height, width), mode="nearest").squeeze(1)
     known = memory.known * kept * (fate >= SPOILT).float()

@@ -21,7 +21,7 @@ from torch import Tensor, nn
 from unwrap.networks.network import Network, Settings
 from unwrap.networks.registry import build_network
 from unwrap.networks.sizes import trained_size
-from unwrap.support import write_bytes
+from unwrap.support import in_one_line, write_bytes
 
 SCHEMA = "1"
 """Version of the metadata."""
@@ -87,6 +87,7 @@ def load_weights(path: Path) -> Weights:
     try:
         if not path.is_file():
             raise ValueError("no such file")
+        # First of all: all tensors are read for the checksum, however large they are.
         if path.stat().st_size > MAX_BYTES:
             raise ValueError(f"more than {MAX_BYTES >> 20} MiB")
         with safe_open(path, framework="pt") as file:
@@ -94,7 +95,7 @@ def load_weights(path: Path) -> Weights:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         return _built(words, tensors)
     except (ValueError, TypeError, KeyError, OSError, RuntimeError, SafetensorError) as error:
-        reason = " ".join(str(error).split())[:200]
+        reason = in_one_line(error)
         raise ValueError(f"{path}: unusable network file ({reason}); {cure}") from None
 
 
@@ -108,12 +109,8 @@ def _built(words: Mapping[str, str], tensors: Mapping[str, Tensor]) -> Weights:
     metadata = {key: _value(word) for key, word in words.items()}
     trained_size(metadata)  # Refused here rather than at the first frame.
     network = build_network(metadata["network"], Settings.of(metadata))
-    network.load_state_dict(
-        {
-            name: tensor.to(torch.float32 if tensor.is_floating_point() else tensor.dtype)
-            for name, tensor in tensors.items()
-        }
-    )
+    # The network was built in float32, and values that are loaded take its type.
+    network.load_state_dict(tensors)
     return Weights(network.eval(), metadata, digest)
 
 

@@ -18,6 +18,7 @@ BAR_HEIGHT_PX = 12
 
 def enlarged(image: Image.Image, narrowest_px: int = NARROWEST_TILE_PX) -> Image.Image:
     """Small images by a whole factor, so that each pixel stays a square."""
+    # -(-a // b) is a / b rounded up.
     return image.convert("RGB").resize(
         [size * max(1, -(-narrowest_px // image.width)) for size in image.size],
         Image.Resampling.NEAREST,
@@ -30,6 +31,7 @@ def bar(name: str, colors: ColorMap, width: int, scale: int) -> Image.Image:
     ramp = np.tile(np.linspace(colors.low, colors.high, width), (scale * BAR_HEIGHT_PX, 1))
     ticks = Image.new("RGB", (width, small + 4), PAPER)
     pen = ImageDraw.Draw(ticks)
+    # Pillow's anchors: left, middle or right end of the words at the place, their top at it.
     for part, anchor, tick in zip((0.0, 0.5, 1.0), ("la", "ma", "ra"), colors.ticks, strict=True):
         pen.text((part * (width - 1), 0), tick, FAINT, _font(small), anchor)
     words = line([text(name, small), text(colors.unit, small, FAINT)])
@@ -45,6 +47,7 @@ def text(words: str, size: int, color: tuple[int, int, int] = INK) -> Image.Imag
 
 
 def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    # It comes with Pillow: pictures look alike wherever they are made.
     return ImageFont.load_default(size)
 
 

@@ -10,8 +10,9 @@ from typing import IO
 
 import numpy as np
 
-from unwrap.support import read_npy_header
+from unwrap.support import in_one_line, read_npy_header
 
+# 256 MiB: some hundred frames of eight samples at 320 x 240; a limit of this project.
 MAX_BYTES = 1 << 28
 """Largest file, and largest sum of the arrays in one."""
 _BROKEN = (
@@ -45,13 +46,7 @@ def read_arrays(path: Path, alone: str, known: Collection[str]) -> dict[str, np.
         with path.open("rb") as file:
             return {alone: _read_npy(file, size)}
     except _BROKEN as error:
-        absent = isinstance(error, FileNotFoundError)
-        raise ValueError(f"{path}: {'no such file' if absent else reason(error)}") from None
-
-
-def reason(error: Exception) -> str:
-    """What an error says, in one line; its name where it says nothing."""
-    return " ".join(str(error).split())[:200] or type(error).__name__
+        raise ValueError(f"{path}: {in_one_line(error)}") from None
 
 
 def _read_npz(path: Path, known: Collection[str]) -> dict[str, np.ndarray]:
@@ -60,6 +55,7 @@ def _read_npz(path: Path, known: Collection[str]) -> dict[str, np.ndarray]:
         unknown = [name for name in members if name not in known]
         if unknown:
             raise ValueError(f"holds {unknown[0]!r}; expected some of {', '.join(known)}")
+        # Before anything is unpacked: a few bytes can promise gigabytes of zeros.
         if sum(entry.file_size for entry in archive.infolist()) > MAX_BYTES:
             raise ValueError(f"unpacks to more than {MAX_BYTES >> 20} MiB")
         arrays = {}
@@ -80,5 +76,5 @@ def _read_npy(file: IO[bytes], size: int) -> np.ndarray:
             f"its header promises {header.dtype} {header.shape}, {header.nbytes} bytes; "
             f"{following} bytes follow"
         )
-    file.seek(0)
+    file.seek(0)  # NumPy reads the header once more.
     return np.lib.format.read_array(file, allow_pickle=False)

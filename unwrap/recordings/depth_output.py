@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from unwrap.depth import points_of
+from unwrap.depth import focal_px, points_of
 from unwrap.recordings.camera import Camera
 from unwrap.recordings.depth_picture import draw_frame
 from unwrap.recordings.frame_correction import CorrectedFrame
@@ -99,11 +98,10 @@ def frame_statistics(frame: CorrectedFrame) -> dict[str, float | int]:
 
 def point_cloud(frame: CorrectedFrame, horizontal_fov_deg: float) -> bytes:
     """Binary little-endian PLY of the valid pixels: metres ahead, left and up, gray as colour."""
-    import trimesh
+    import trimesh  # Here: it takes long to load, and only this needs it.
 
     valid, width = frame.depth.valid[0], frame.depth.valid.shape[-1]
-    # Focal length in pixels: half the image's width lies under half the field of view.
-    focal = width / 2 / math.tan(math.radians(horizontal_fov_deg) / 2)
+    focal = focal_px(width, horizontal_fov_deg)
     points = points_of(frame.depth.distance_m.double(), focal)[:, 0, valid].T
     colors = None
     if frame.recording.gray is not None:

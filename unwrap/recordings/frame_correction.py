@@ -47,6 +47,7 @@ def correct_recording(recording: Recording, camera: Camera) -> list[CorrectedFra
     for number in range(len(recording.names)):
         one, prediction = recording.frame(number), None
         if unwrapper is not None and one.gray is not None:
+            # A recording has one map for all frames, a batch of frames one for each.
             offset_lsb = None if one.offset_lsb is None else one.offset_lsb.unsqueeze(0)
             sensed = Sensed(one.gray, one.raw, offset_lsb)
             prediction = unwrapper.predict_sensed(sensed, camera.description)

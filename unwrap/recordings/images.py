@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from unwrap.recordings.arrays import MAX_BYTES, reason
+from unwrap.recordings.arrays import MAX_BYTES
 from unwrap.recordings.recording import Recording, recording_of
 from unwrap.signal import ADC_BITS
+from unwrap.support import in_one_line
 
 HIGHEST_MM = 2**16 - 1
 """Farthest distance that a depth image can hold; farther ones are stored as this."""
@@ -37,6 +38,7 @@ def read_gray16(path: Path) -> np.ndarray:
         with warnings.catch_warnings():
             # Pillow only warns of images that would fill the memory; here they are refused.
             warnings.simplefilter("error", Image.DecompressionBombWarning)
+            # PNG alone: Pillow goes by the content, and would let any of its decoders at the file.
             with Image.open(path, formats=["PNG"]) as image:
                 if image.mode != "I;16":
                     raise ValueError(f"mode {image.mode}; expected 16-bit gray")
@@ -44,8 +46,7 @@ def read_gray16(path: Path) -> np.ndarray:
                     raise ValueError(f"larger than {MAX_BYTES >> 20} MiB")
                 return np.asarray(image, dtype=np.uint16)
     except _BROKEN as error:
-        absent = isinstance(error, FileNotFoundError)
-        raise ValueError(f"{path}: {'no such file' if absent else reason(error)}") from None
+        raise ValueError(f"{path}: {in_one_line(error)}") from None
 
 
 def read_folder(folder: Path, *, bits: int = ADC_BITS) -> Recording:
@@ -101,6 +102,7 @@ def depth_png(distance_m: np.ndarray, valid: np.ndarray) -> bytes:
     Distances below 1 mm are stored as 1, beyond `HIGHEST_MM` as that.
     """
     millimetres = np.where(valid, distance_m, 0.0).astype(np.float64) * 1000
+    # 0 says that there is no depth, so that the nearest depth is 1.
     words = np.where(valid, millimetres.round().clip(1, HIGHEST_MM), 0).astype(np.uint16)
     content = io.BytesIO()
     Image.fromarray(words).save(content, format="PNG")

@@ -175,6 +175,7 @@ def _raw_frame(dcs: np.ndarray, where: str, bits: int) -> RawFrame:
             f"within {low}..{high} LSB, or words as unsigned integers"
         )
     samples = _tensor(dcs)
+    # The ends of the range are the words by which the converter reports overflow.
     return RawFrame(samples, ((samples <= low) | (samples >= high)).any(1))
 
 

@@ -27,9 +27,9 @@ def decode_at(
     offset_lsb : float [H, W] or [B, H, W], optional
         Stored dark-offset map, subtracted from the samples.
     shift_m : float [B], optional
-        Added to the wrapped distances, metres, which wrap. For a real sensor minus the drift of
-        distance at its temperature; simulated samples have no drift in them, and the shift is what
-        the compensation of the drift would leave.
+        Added to the wrapped distances, metres, which wrap again. For a real sensor: minus the error
+        of distance that its temperature brings. Simulated samples are without that error; their
+        shift is the part of it that the sensor's own compensation leaves.
 
     Raises
     ------
@@ -44,6 +44,7 @@ def decode_at(
 def samples_at(frequency: int, raw: RawFrame) -> Tensor:
     """Samples [B, 2 or 4, H, W] at f1 (0) or f2 (1)."""
     start = frequency * SAMPLES_PER_FREQUENCY
+    # Of a frame of two samples the slice takes both: it ends where the samples end.
     return raw.dcs_lsb[:, start : start + SAMPLES_PER_FREQUENCY]
 
 
@@ -57,7 +58,7 @@ def phase_at(
 ) -> Tensor:
     """Phase [B, H, W] in [0, 2 pi) of quadratures at f1 (0) or f2 (1); see `decode_at`."""
     angle_rad = torch.atan2(sine, cosine)
-    # Without a table the same conversion needs no look-up.
+    # Without a table there is nothing to look up, and the same conversion is one multiplication.
     to_turns = to_turns_ if sensor.wiggle is None else sensor.wiggle[frequency].turns_of
     turns = to_turns(angle_rad)
     if shift_m is not None:

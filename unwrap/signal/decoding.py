@@ -93,6 +93,8 @@ def _by_torch(
         cosine, sine = samples.unbind(-3)
         return cosine, sine, _length(cosine, sine), None
     first, second, third, fourth = samples.unbind(-3)
+    # Opposite samples have opposite signs: their difference is twice the quadrature, so that the
+    # amplitude is halved below; their sum is what is not light.
     cosine, sine = first - third, second - fourth
     residual = torch.maximum((first + third).abs(), (second + fourth).abs())
     return cosine, sine, _length(cosine, sine) / 2, residual
@@ -109,6 +111,8 @@ def _by_loop(
     *leading, count, height, width = dcs.shape
     samples, shape = dcs.reshape(-1, count, height, width), (*leading, height, width)
     offset = array_of(0.0 if offset_lsb is None else offset_lsb, shape)
+    # One block for all four maps. Two samples leave that of the residual unwritten; it is not
+    # handed out then.
     maps = np.empty((4, len(samples), height, width), np.float32)
     if not decode_pixels(array(samples), offset.reshape(maps[0].shape), *maps):
         # The loop only tells that some sample is not finite; the error says which.

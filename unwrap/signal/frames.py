@@ -93,6 +93,7 @@ class DepthFrame:
     @property
     def wrapped_m(self) -> Tensor:
         """Distance within one unambiguous range of f1, float32 [B, H, W], metres."""
+        # As `unwrap.signal.decoding.distance_m`, which cannot be imported: it imports this module.
         return self.phase_rad * (self.unambiguous_m / (2 * math.pi))
 
     @property

@@ -117,6 +117,7 @@ def is_strong(amplitude: Tensor, noise_lsb: Tensor | float, sensor: SensorDescri
     >>> is_strong(torch.tensor([2.9, 3.0]), 1.0, SensorDescription(min_snr=3.0))
     tensor([False,  True])
     """
+    # A product: the quotient is NaN where neither signal nor noise is.
     return amplitude >= noise_lsb * sensor.min_snr
 
 

@@ -2,7 +2,8 @@
 
 Sample k of 0..7 is D_k ~ m S cos(phi - k pi / 2), with the signal S and the demodulation contrast
 m: 0..3 are taken at f1, 4..7 at f2, so that acquisitions of 2 and 4 DCS are prefixes of that of 8.
-Only this module and `unwrap.signal.decoding` know these conventions.
+`unwrap.signal.decoding` inverts this model, and `correlation_samples` of `unwrap.signal.wiggle`
+draws samples by it.
 """
 
 from __future__ import annotations
@@ -78,5 +79,6 @@ def harmonic_weights(strength: float, highest: int) -> tuple[tuple[int, float], 
         raise ValueError(f"strength is {strength}; expected 0 to 1")
     if highest < 1 or highest % 2 == 0:
         raise ValueError(f"highest is {highest}; expected an odd number of at least 1")
+    # Without strength none are listed, so that a pure sine costs one cosine.
     overtones = range(3, highest + 1, 2) if strength > 0 else ()
     return ((1, 1.0), *((h, strength / h**2) for h in overtones))

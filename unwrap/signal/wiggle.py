@@ -31,7 +31,9 @@ from unwrap.signal.frequencies import unambiguous_range_m
 from unwrap.support import write_json
 
 BINS = 256
+"""Entries of a table; linear between them, it follows the curve to 3e-4 rad, 0.3 mm at 24 MHz."""
 LARGEST_FILE_BYTES = 2**20
+"""Far above the some 10 kB of two tables; larger files are not even read."""
 
 
 class TurnsTable(NamedTuple):
@@ -190,6 +192,7 @@ def measure_wiggle(decoded_rad: Tensor, true_rad: Tensor, *, bins: int = BINS) -
     if not bool(error.isfinite().all()):
         raise ValueError("decoded_rad or true_rad holds NaN or infinity")
     place = torch.remainder(decoded, TWO_PI) * (bins / TWO_PI)
+    # The largest remainders round up to the whole period, which is bin 0 again.
     left = place.long().remainder(bins)
     empty = (torch.bincount(left, minlength=bins) == 0).nonzero().flatten().tolist()
     if empty:
@@ -230,6 +233,7 @@ def wiggle_of(weights: Sequence[tuple[int, float]], *, bins: int = BINS) -> Wigg
     >>> round(max(errors), 4)
     0.0711
     """
+    # Many phases to a bin, as wiggle moves some of them into the next; a bin may not stay empty.
     true_rad = torch.arange(32 * bins, dtype=torch.float64) * (TWO_PI / (32 * bins))
     samples = correlation_samples(true_rad, weights)
     return measure_wiggle(decode(samples.unsqueeze(-2)).phase_rad[0], true_rad, bins=bins)

@@ -10,6 +10,8 @@ from typing import IO
 import numpy as np
 from numpy.lib import format as npy
 
+from unwrap.support.error_text import in_one_line
+
 # NumPy parses the header as Python source, so that damage shows in whatever way source can be
 # wrong: a bracket that is never closed is a TokenError, many of them a RecursionError.
 _DAMAGED = (
@@ -55,5 +57,4 @@ def read_npy_header(file: IO[bytes]) -> NpyHeader:
     try:
         return NpyHeader(*_HEADERS[version](file))
     except _DAMAGED as error:
-        told = " ".join(str(error).split())[:200] or type(error).__name__
-        raise ValueError(f"malformed npy header: {told}") from None
+        raise ValueError(f"malformed npy header: {in_one_line(error)}") from None

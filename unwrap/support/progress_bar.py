@@ -37,6 +37,8 @@ def progress(total: int, what: str, unit: str, *, done: int = 0) -> tqdm:
         What is being done, and the name of one unit.
     """
     terminal = sys.stderr.isatty()
+    # Time alone decides when to draw (`miniters=1`): tqdm would else learn to draw every so many
+    # units, and fall silent as soon as they take longer.
     return tqdm(
         total=total,
         initial=done,

@@ -27,6 +27,7 @@ def mapped(function: Callable[..., Tensor], value: Value, *others: Value) -> Val
         return function(value, *others)  # type: ignore[return-value]
     if isinstance(value, tuple):
         return tuple(mapped(function, *parts) for parts in zip(value, *others, strict=True))  # type: ignore[return-value]
+    # `is_dataclass` also says yes to the class itself, which has no values.
     if not dataclasses.is_dataclass(value) or isinstance(value, type):
         return value
     parts: dict[str, Any] = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 import torch
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from unwrap.networks import (
     LossWeights,
@@ -17,13 +17,12 @@ from unwrap.networks import (
     network_class,
 )
 from unwrap.signal import Shots
+from unwrap.support import Section
 from unwrap.training.data import Augmentation, SplitBy
 
 
-class TrainConfig(BaseModel):
+class TrainConfig(Section):
     """Training of an unwrapping network."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     network: NetworkName = Field("tofregnet", description="which network")
     bank: str = Field("training", description="name or path of the bank to train on")

@@ -58,10 +58,10 @@ class Augmentation:
         Gray is multiplied by a factor drawn from the same kind of interval, then clipped at 1.
     """
 
-    flip_horizontal: bool = True
-    flip_vertical: bool = False
-    contrast: float = 0.2
-    brightness: float = 0.3
+    flip_horizontal: bool
+    flip_vertical: bool
+    contrast: float
+    brightness: float
 
     def __call__(
         self, sensed: Sensed, truth: Truth, *, generator: torch.Generator
@@ -78,6 +78,7 @@ class Augmentation:
             if wanted:
                 flip = partial(_flip, chosen=chosen, axis=axis)
                 sensed, truth = mapped(flip, sensed), mapped(flip, truth)
+        # A power of a number in [-1, 1]: as often darker as lighter, by the same factors.
         gamma = (1 + self.contrast) ** exponent.to(sensed.gray.device)
         gain = (1 + self.brightness) ** factor.to(sensed.gray.device)
         gray = sensed.gray ** gamma[:, None, None] * gain[:, None, None]
@@ -138,6 +139,8 @@ class EpochShuffle(Sampler[Order]):
 
     def __iter__(self) -> Iterator[Order]:
         """This epoch's batches."""
+        # One stream for the order and then for each batch's samples: another batch size or choice
+        # of samples deals the frames in the same order.
         generator = np.random.default_rng((self.seed, self.epoch))
         order = generator.permutation(self.frames).tolist()
         for start in range(0, self.frames, self.batch_size):
@@ -167,6 +170,7 @@ def loader(
     """The batches of `source` in the given order, acquired when asked for or ahead by threads."""
     if threads:
         return AcquiredAhead(source, orders, threads)
+    # No batch size: an `Order` is a whole batch already.
     return DataLoader(Acquired(source), batch_size=None, sampler=orders)
 
 

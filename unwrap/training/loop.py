@@ -95,6 +95,7 @@ class TrainingModule(lightning.LightningModule):
         accuracy = (right & truth.known).sum() / (scored & truth.known).sum().clamp(min=1)
         # Lightning averages over batches, weighted by `batch_size`.
         self.log("wrap_accuracy", accuracy, prog_bar=True, batch_size=len(sensed))
+        # The loader hands out the same frames each epoch: pictures can be compared.
         if index == 0 and isinstance(self.logger, TensorBoardLogger):
             depths = torch.cat((truth.distance_m[0], predicted_m[0]), dim=1) / self.config.clamp_m
             picture = torch.cat((sensed.gray[0], depths.clamp(0, 1)), dim=1).float().cpu()
@@ -123,6 +124,7 @@ class TrainingModule(lightning.LightningModule):
             weight_decay=config.weight_decay,
             fused=True,  # A third of the time, which is a fifth of a step with few frames.
         )
+        # One more than the warm-up: no step is taken at rate 0, which would teach nothing.
         warmup = int(config.warmup_share * self.steps)
         final = config.final_learning_rate / config.learning_rate
 
@@ -229,6 +231,8 @@ def train(
 
 def _trainer(config: TrainConfig, out: Path, progress: bool, steps: int) -> lightning.Trainer:
     """Lightning's trainer, for epochs of so many `steps`."""
+    # Without a monitored number the best is the last; without counted versions it has one name, by
+    # which `train` finds it again.
     every_epoch = ModelCheckpoint(
         out, config.network, save_top_k=1, monitor=None, enable_version_counter=False
     )
@@ -242,6 +246,7 @@ def _trainer(config: TrainConfig, out: Path, progress: bool, steps: int) -> ligh
         gradient_clip_val=config.clip_norm or None,
         logger=TensorBoardLogger(out, name="tensorboard", version=config.network),
         log_every_n_steps=max(1, steps // LOGGED_PER_EPOCH),
+        # Batches are of one size but for the last: it pays to try which convolution is fastest.
         benchmark=training_device().type == "cuda",
         devices=1,
     )
@@ -316,6 +321,7 @@ def measure(module: TrainingModule, source: Source) -> dict[str, Any]:
         counts = _counts(module.predict(sensed).distance_m, truth, config)
         for key in (source.families[order.numbers[0]], "all"):
             sums[key] = sums.get(key, torch.zeros(4, dtype=torch.float64)) + counts
+    # Sums of pixels, divided once at the end: frames with few scored pixels weigh little.
     names = ("wrap_accuracy", "floor_wrap_accuracy", "mae_m")
     shares = {key: (total[1:] / total[0]).tolist() for key, total in sums.items()}
     families = {key: dict(zip(names, value, strict=True)) for key, value in shares.items()}

@@ -6,6 +6,7 @@ import numpy as np
 
 RANDOM_SPLITS = ("train", "validation", "test")
 FEWEST_FRAMES = 10
+"""So that a tenth of them is at least one."""
 
 
 def random_split(frames: int, *, seed: int = 0) -> dict[str, np.ndarray]:

@@ -102,6 +102,14 @@ def test_unknown_pixels_are_never_the_farthest():
     assert depth_guided_loss(prediction, truth).item() == pytest.approx(18.0**2)
 
 
+def test_where_fewer_pixels_are_known_than_count_the_others_are_no_difference():
+    truth, known = torch.full((1, 20, 20), 5.0), torch.zeros(1, 20, 20, dtype=torch.bool)
+    known[:, 3, 3] = True  # One of the four that count.
+    for wrong in (100.0, torch.nan):
+        prediction = torch.full((1, 20, 20), 7.0).masked_fill(~known, wrong)
+        assert depth_guided_loss(prediction, truth, known).item() == pytest.approx(2.0**2 / 4)
+
+
 def test_equation_7_counts_unknown_pixels_as_right():
     generator = torch.Generator().manual_seed(0)
     prediction, truth = 30 * torch.rand(2, 2, 24, 24, generator=generator)

@@ -1,4 +1,5 @@
 import threading
+from dataclasses import replace
 
 import pytest
 import torch
@@ -7,6 +8,7 @@ from unwrap_source import Walls
 from unwrap.signal.frames import RawFrame
 from unwrap.signal.sensed import Sensed, Truth
 from unwrap.signal.shots import Shots
+from unwrap.training.config import TrainConfig
 from unwrap.training.data import Augmentation, EpochShuffle, Order, in_order, loader
 
 STILL = Augmentation(flip_horizontal=False, flip_vertical=False, contrast=0, brightness=0)
@@ -48,7 +50,7 @@ def test_gray_and_depth_are_mirrored_together_in_about_half_the_images(which, ax
 
 def test_contrast_and_brightness_stay_within_their_limits():
     gray = torch.full((500, 2, 2), 0.25)
-    augment = Augmentation(flip_horizontal=False, contrast=0.5, brightness=0.2)
+    augment = replace(STILL, contrast=0.5, brightness=0.2)
     truth = Truth(gray, gray.bool())
     varied, _ = augment(Sensed(gray), truth, generator=torch.Generator().manual_seed(0))
     new = varied.gray
@@ -59,7 +61,7 @@ def test_contrast_and_brightness_stay_within_their_limits():
 
 def test_augmentation_depends_on_the_generator_alone():
     draws = [
-        Augmentation()(*ramp(), generator=torch.Generator().manual_seed(s))[0].gray
+        TrainConfig().augmentation(*ramp(), generator=torch.Generator().manual_seed(s))[0].gray
         for s in (1, 1, 2)
     ]
     assert torch.equal(draws[0], draws[1])

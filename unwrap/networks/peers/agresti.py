@@ -70,6 +70,8 @@ class AgrestiNet(Network):
         padded = pad(maps)
         fine = self.fine(padded)
         size = fine.shape[-2:]
+        # Pooled pixels are blocks of 4 x 4 from the corner on; torch's default (corners not
+        # aligned) puts their centres there.
         coarse = functional.interpolate(self.coarse(padded), size, mode="bilinear")
         error = self.head(torch.cat((coarse, fine), 1))[:, 0, :height, :width].float()
         wrapped_m = maps[:, 0] * self.settings.unambiguous_m

@@ -47,6 +47,7 @@ class ChenNet(Autoencoder):
         """maps [B, 8, H, W] -> cosine and sine of the phase, logits: [B, 2 + classes, H, W]."""
         height, width = maps.shape[-2:]
         output = super().forward(pad(maps))[..., :height, :width].float()
+        # The first two samples over their amplitude are about its cosine and sine.
         vector = functional.normalize(maps[:, :2].float() + output[:, :2])
         return torch.cat((vector, output[:, 2:]), 1)
 

@@ -43,12 +43,14 @@ def sample_planes(sensed: Sensed, sensor: SensorDescription) -> Tensor:
         sensed.require_raw(),
     )
     samples = raw.dcs_lsb[:, :SAMPLES_PER_FREQUENCY]
+    # Maps 0 to 3 are the samples, 4 the amplitude, 5 the saturation, 6 how many samples there are.
     planes = frame.phase_rad.new_zeros(len(samples), PLANES, *samples.shape[-2:])
     for k in range(samples.shape[1]):
         planes[:, k] = (frame.phase_rad - k * (math.pi / 2)).cos()
     if samples.shape[1] == SAMPLES_PER_FREQUENCY:
         if sensed.offset_lsb is not None:
             samples = samples - sensed.offset_lsb.unsqueeze(-3)
+        # Rolled by two, each sample meets its opposite.
         common = (samples + samples.roll(2, 1)) / 2
         planes[:, :4] += (common / (frame.amplitude + noise).unsqueeze(1)).clamp(-1, 1)
         planes[:, 6] = 1.0

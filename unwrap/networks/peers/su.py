@@ -24,7 +24,7 @@ from unwrap.signal import Sensed, SensorDescription, Truth
 
 RESIDUAL_BLOCKS = 4
 SMOOTHNESS = 0.1
-"""Weight of the smoothness term; ours."""
+"""Weight of the smoothness term; assumed."""
 
 
 class SuNet(Network):
