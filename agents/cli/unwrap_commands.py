@@ -203,6 +203,8 @@ def export_network(arguments: Namespace) -> int:
     frames = frames_of("test", CHECKED_FRAMES)
     metadata = metadata_of(unwrapper, arguments.merge, sensor, config.sensor.name, size, shots)
     export = CheckedExport(network, frames, metadata)
+    # `write` checks against torch before it writes; the quantised file is calibrated on frames of
+    # training and checked on those of the test.
     found: dict[str, Any] = {"frames": frames.source, "opset": OPSET}
     found["onnx"] = export.write(arguments.out)
     _tell_of_file(found["onnx"])
@@ -216,6 +218,7 @@ def export_network(arguments: Namespace) -> int:
 
 def _image_size(arguments: Namespace) -> tuple[int, int]:
     """Height and width in pixels, checked."""
+    # Assumed limits: below, the networks' coarsest maps have no pixels left; above, memory ends.
     for name in ("height", "width"):
         if not 16 <= arguments[name] <= 4096:
             raise ValueError(f"{name} is {arguments[name]}; expected 16 to 4096 pixels")
