@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from jsonargparse import ArgumentParser, Namespace
 
@@ -242,9 +242,9 @@ def add_sensor_and_merge(parser: ArgumentParser) -> None:
     from unwrap.depth import Merge
 
     parser.add_argument("--sensor", default="epc660", help="name or path of a sensor configuration")
-    parser.add_argument(
-        "--merge", type=Merge, default="nearest", help="nearest, floor (eq. 6), or none"
-    )
+    # Listed by its type, so that a new rule is told of here as soon as it has a name.
+    rules = ", ".join(get_args(Merge))
+    parser.add_argument("--merge", type=Merge, default="nearest", help=f"merge rule: {rules}")
 
 
 COMMANDS: tuple[Command, ...] = (
