@@ -26,6 +26,7 @@ from unwrap.training import TrainConfig
 from unwrap.training.loop import TrainingModule
 
 HEIGHT, WIDTH, CHANNELS = 240, 320, 64
+# Assumed: what is left to gain beyond these is not worth code of one's own for it.
 SINGLE_GOAL, BATCH_GOAL, TRAINING_GOAL, OUTSIDE_GOAL = 0.65, 0.70, 0.50, 0.05
 BATCHES = {"cpu": 16, "cuda": 64}
 TRAINING_BATCHES = {"cpu": (8, 32), "cuda": (1, 64)}
@@ -35,7 +36,8 @@ PRODUCT_SIZES = {"cpu": 2048, "cuda": 8192}
 ROUNDS = {"cpu": 15, "cuda": 50}
 FEW_ROUNDS = {"cpu": 5, "cuda": 10}
 FORWARD_AND_BACKWARD = 3
-"""A training step's multiply-accumulates over those of its forward pass."""
+"""A training step's multiply-accumulates over those of its forward pass: the backward pass takes
+two products for each of the forward's, for the gradients of the input and of the weights."""
 
 
 def run() -> list[dict[str, Any]]:
@@ -138,13 +140,17 @@ def share(
 def warm_and_timed(
     first: Callable[[], object], second: Callable[[], object], device: torch.device, rounds: int
 ) -> tuple[float, float]:
-    """Seconds of both, by a clock that waits for the device, after a turn that is not counted."""
+    """Seconds of both, by a clock that waits for the device, after a turn that is not counted.
+
+    A GPU is handed its work and goes on alone: a clock that does not wait times the handing over.
+    """
 
     def clock() -> float:
         if device.type == "cuda":
             torch.cuda.synchronize(device)
         return perf_counter()
 
+    # The first turn compiles, plans convolutions and allocates.
     alternately(first, second, 1, clock)
     return alternately(first, second, rounds, clock, settled=True)
 

@@ -24,7 +24,7 @@ from shotenv.world.geometry import World
 from unwrap.signal import Shots
 
 GOALS = {(160, 120): 1.3, (320, 240): 1.15}
-"""Largest ratio by width and height: in a small frame the building of scenes weighs more."""
+"""Largest ratio by width and height (assumed): in a small frame building scenes weighs more."""
 ROUNDS = 9
 """Pairs of which the median ratio counts."""
 SEED = 2
@@ -44,6 +44,7 @@ def run() -> list[dict[str, Any]]:
 def _race(world: World, camera: CameraConfig, sensor: SensorConfig, goal: float) -> dict[str, Any]:
     path, renderer = _path_render(world, camera), FrameRenderer(world, sensor)
     times = alternating(lambda i: renderer.frame(0.0, camera, seed=i), path, ROUNDS)
+    # Of the pairs' ratios, not the ratio of medians: what slows the machine slows both of a pair.
     ratio = statistics.median(ours / theirs for ours, theirs in times)
     ours, theirs = (statistics.median(column) for column in zip(*times, strict=True))
     samples = (int(Shots.EIGHT) + camera.gray_instants) * camera.samples_per_pixel
@@ -59,6 +60,7 @@ def alternating(
     ours: Callable[[int], Any], theirs: Callable[[int], Any], rounds: int
 ) -> list[tuple[float, float]]:
     """Seconds of two functions called in turn, after a round that is not counted."""
+    # The first round compiles the kernels, which takes longer than all the others.
     times = [(_seconds(ours, index), _seconds(theirs, index)) for index in range(rounds + 1)]
     return times[1:]
 
@@ -89,6 +91,7 @@ def _path_render(world: World, camera: CameraConfig) -> Callable[[int], np.ndarr
     scene, integrator = stock_scene(world, 0.0, camera), stock_path(camera)
     rays, rays_per_sample = rays_per_pixel(camera)
     samples = round(rays / rays_per_sample)
+    # To NumPy, as the frame's maps are: Mitsuba computes only when somebody looks.
     return lambda seed: np.array(
         mitsuba.render(scene, integrator=integrator, spp=samples, seed=seed)
     )

@@ -26,20 +26,27 @@ HEIGHT, WIDTH, FRAMES = 120, 160, 16
 REPEATS = 100
 DRIVES = 16
 NEVER_TRIPS = {"laser": {"trip_k": 2000.0, "release_k": 1999.0}}
-"""Every timed step does the whole work."""
+"""A tripped laser takes no samples: with this one every timed step does the whole work."""
+GOAL, VECTOR_GOAL = 3.0, 1.0
+"""Assumed: a step beside the least that it must do; a vector beside its drives one by one."""
 
 
 def run() -> list[dict]:
     threads, cache = torch.get_num_threads(), os.environ.get("SHOTENV_CACHE")
+    # On one, since `alternately` reads the clock of this thread alone.
     torch.set_num_threads(1)
     try:
         with tempfile.TemporaryDirectory() as folder:
+            # The network's predictions for the made-up bank are of no use to anyone else.
             os.environ["SHOTENV_CACHE"] = folder
             fields = write_problem(Path(folder))
             return [*(single(fields, shots) for shots in Shots), *batched(fields)]
     finally:
         torch.set_num_threads(threads)
-        os.environ.pop("SHOTENV_CACHE") if cache is None else os.environ.update(SHOTENV_CACHE=cache)
+        if cache is None:
+            del os.environ["SHOTENV_CACHE"]
+        else:
+            os.environ["SHOTENV_CACHE"] = cache
 
 
 def write_problem(folder: Path) -> dict[str, object]:
@@ -48,8 +55,9 @@ def write_problem(folder: Path) -> dict[str, object]:
     shape = (FRAMES, HEIGHT, WIDTH)
     distance = random.uniform(2, 20, shape).astype(np.float32)
     active = 0.1 / distance**2
+    # All eight at one frequency: what the light is worth does not matter here.
     phase = 4 * math.pi * 24e6 / 299_792_458 * distance
-    turns = [math.pi / 2 * k for k in range(8)]
+    turns = [math.pi / 2 * k for k in range(Shots.EIGHT)]
     arrays = {
         "correlation": np.stack([active * np.cos(phase - turn) for turn in turns], 1),
         "active": active,
@@ -67,8 +75,12 @@ def write_problem(folder: Path) -> dict[str, object]:
     write_manifest(folder / "bank", "bench", [record], (HEIGHT, WIDTH))
     network = {"network": "tofregnet", "width": 4, "range_m": 30.0, "f1_hz": 24e6}
     save_weights(folder / "net.safetensors", TofRegNet(4, 30.0), network)
-    long = {"frames_per_drive": 10_000}
-    return {"bank": str(folder / "bank"), "unwrapper": str(folder / "net.safetensors"), **long}
+    return {
+        "bank": str(folder / "bank"),
+        "unwrapper": str(folder / "net.safetensors"),
+        # More than are ever timed: no step begins a new drive.
+        "frames_per_drive": 10_000,
+    }
 
 
 def single(fields: dict[str, object], shots: Shots) -> dict:
@@ -81,8 +93,8 @@ def single(fields: dict[str, object], shots: Shots) -> dict:
         state["now"], _ = step(problem, state["now"], action)
 
     step_s, least_s = alternately(play, lambda: least([shots], pixels), REPEATS)
-    note = f"{1e3 * step_s:.2f} ms against {1e3 * least_s:.2f} ms, 160 x 120, one thread"
-    return row(f"step, {int(shots)} DCS / normals + atan2", step_s / least_s, "<=", 3.0, note)
+    note = f"{1e3 * step_s:.2f} ms against {1e3 * least_s:.2f} ms, {WIDTH} x {HEIGHT}, one thread"
+    return row(f"step, {int(shots)} DCS / normals + atan2", step_s / least_s, "<=", GOAL, note)
 
 
 def least(acquisitions: Sequence[Shots], pixels: torch.Tensor) -> None:
@@ -100,20 +112,22 @@ def batched(fields: dict[str, object]) -> list[dict]:
     many = ShotScheduleVectorEnv(DRIVES, **fields)
     one.reset(seed=0)
     many.reset(seed=0)
-    actions = np.arange(DRIVES) % 3
+    actions = np.arange(DRIVES) % len(Shots)
 
     def singly() -> None:
         for action in actions:
-            one.step(actions[action : action + 1])
+            one.step(np.array([action]))
 
     def together() -> None:
         many.step(actions)
 
+    # Fewer turns: each takes the time of sixteen steps.
     many_s, one_s = alternately(together, singly, REPEATS // 10)
     note = f"{1e3 * many_s / DRIVES:.2f} ms per step against {1e3 * one_s / DRIVES:.2f} ms"
-    singles = row(f"vector of {DRIVES} / {DRIVES} single steps", many_s / one_s, "<=", 1.0, note)
+    name = f"vector of {DRIVES} / {DRIVES} single steps"
+    singles = row(name, many_s / one_s, "<=", VECTOR_GOAL, note)
     taken, pixels = [tuple(Shots)[action] for action in actions], torch.randn(2, HEIGHT, WIDTH)
     many_s, least_s = alternately(together, lambda: least(taken, pixels), REPEATS // 10)
     note = f"{1e3 * many_s / DRIVES:.2f} ms per step against {1e3 * least_s / DRIVES:.2f} ms"
     name = f"vector of {DRIVES}, 2, 4 and 8 DCS / normals + atan2"
-    return [singles, row(name, many_s / least_s, "<=", 3.0, note)]
+    return [singles, row(name, many_s / least_s, "<=", GOAL, note)]

@@ -22,6 +22,7 @@ def alternately(
     turns = [
         (seconds(first, clock, settled), seconds(second, clock, settled)) for _ in range(repeats)
     ]
+    # A whole turn and not two medians, so that the seconds that are reported give the ratio.
     return sorted(turns, key=lambda turn: turn[0] / turn[1])[repeats // 2]
 
 

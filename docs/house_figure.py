@@ -57,6 +57,7 @@ FLOORS = {
     "shotenv": Floor(360, 678, 661, "#e8f5eb", "#1f6a45"),
     "unwrap": Floor(34, 348, 51, "#e6f0fa", "#20588c"),
 }
+# Lower and upper edges of the rows of rooms.
 TOP = (736, 852)
 BACK, FRONT = (530, 644), (412, 522)
 MAIN, CELLAR = (160, 298), (67, 152)
@@ -148,6 +149,7 @@ VALUES: dict[str, tuple[float, float]] = {
 
 def rooms_of_the_test() -> tuple[str, ...]:
     """Rooms inside the three folders, from the table of `test_imports.py`."""
+    # By its path: the tests are no package, and this script runs without pytest's search path.
     path = ROOT / "tests" / "architecture" / "test_imports.py"
     spec = spec_from_file_location(path.stem, path)
     assert spec is not None and spec.loader is not None
@@ -159,6 +161,7 @@ def rooms_of_the_test() -> tuple[str, ...]:
 def purpose(room: str) -> str:
     """What the door of a room says it is for: its first sentence."""
     door = ROOT / room.replace(".", "/") / "__init__.py"
+    # Read and not imported: the picture is drawn without torch and mitsuba.
     words = ast.get_docstring(ast.parse(door.read_text(encoding="utf-8"))) or ""
     line = words.splitlines()[0].replace("`", "")
     return line.split(". ")[0].removesuffix(".")
@@ -226,6 +229,7 @@ def _room(page: Axes, room: str, place: Box) -> None:
         page.text((place.left + place.right) / 2, middle, name, color=ink, ha="center", **_font(10))
         return
     page.text(place.left + 9, place.high - 15, name, color=ink, **_font(12.5, "bold"))
+    # A letter of this size is about 6.9 units wide; found by looking at the picture.
     columns = int((place.right - place.left - 14) / 6.9)
     for number, line in enumerate(textwrap.wrap(purpose(room), columns)):
         page.text(place.left + 9, place.high - 37 - 15.5 * number, line, color=TEXT, **_font(9.2))
@@ -245,6 +249,7 @@ def _way(page: Axes) -> None:
             FancyArrowPatch(start, end, arrowstyle="-|>", mutation_scale=12, color=color, zorder=5)
         )
     for room, (x, y) in DOORS.items():
+        # The hallway of `unwrap` runs above its rooms, the others below theirs.
         wall = PLACES[room].high if y == LOWER else PLACES[room].low
         page.plot((x, x), (y, wall), color=CORRIDOR, lw=2.2, zorder=3)
         page.plot(x, y, "o", color="white", mec=CORRIDOR, mew=2, ms=7, zorder=4)

@@ -50,11 +50,13 @@ STYLE = {
     "legend.frameon": False,
     "legend.fontsize": 8,
 }
+# What stands between the marks of the page is replaced, the rest of it is written by hand.
 TABLE = re.compile(r"(?<=<!-- numbers -->\n).*?(?=<!-- end of numbers -->)", re.DOTALL)
 
 
 def main(names: list[str]) -> None:
     """Draw the named figures, or all of them and the table."""
+    # Sums are split among threads, and their last bits depend on how many there are.
     torch.set_num_threads(1)
     IMAGES.mkdir(parents=True, exist_ok=True)
     rows = [row for make in FIGURES if make.__name__ in names or not names for row in draw(make)]
@@ -68,9 +70,11 @@ def main(names: list[str]) -> None:
 def draw(make: Callable[[], Made]) -> list[Row]:
     """Save one figure under its function's name; its rows of the table."""
     start = time.perf_counter()
+    # From matplotlib's own defaults: a style file of the reader's would change the figures.
     with mpl.rc_context({**mpl.rcParamsDefault, **STYLE}):
         figure, rows = make()
         path = IMAGES / f"{make.__name__}.png"
+        # Without the version of matplotlib a figure that has not changed is the same file.
         figure.savefig(path, dpi=140, metadata={"Software": None})
     print(f"{path.name} {time.perf_counter() - start:.1f} s", file=sys.stderr)
     return rows

@@ -30,6 +30,8 @@ def render_arguments(parser: ArgumentParser) -> None:
 
 def render_bank(arguments: Namespace) -> int:
     """Render a bank."""
+    # Here and below imports stand inside the commands: `shotenv --help` is to answer at once, and
+    # torch alone takes seconds to load.
     from shotenv.bank import build_bank
 
     config = section_of(BankConfig, arguments)
@@ -62,6 +64,7 @@ def tell_about_banks(arguments: Namespace) -> int:
         print_banks(banks)
         write_numbers(arguments, banks)
         return DONE
+    # Whoever asks what a bank holds does not want to wait an hour for it to be rendered.
     bank = open_bank(arguments.bank, render=False)
     about = contents_of(bank)
     print_contents(about)

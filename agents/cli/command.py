@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from shotenv.config import configs_dir
 from unwrap.support import Section, write_json
 
+# 130 is what shells report of a program that Ctrl-C ended: 128 + SIGINT.
 DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
 
 
@@ -42,8 +43,8 @@ class Command:
         parser = ArgumentParser(
             prog=f"shotenv {self.words}",
             description=self.help,
-            exit_on_error=False,
-            allow_abbrev=False,
+            exit_on_error=False,  # `main` turns errors into one sentence and an exit status
+            allow_abbrev=False,  # else a misspelt option may be taken for the start of another
         )
         self.arguments(parser)
         return parser

@@ -10,10 +10,10 @@ import sys
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 
-NEEDED_BYTES = 2 * 10**9
+NEEDED_BYTES = 2 * 10**9  # assumed: the starter bank, its predictions and a run, with room to spare
 OLDEST_PYTHON = (3, 11)
-OTHERS = ("all", "dev", "docs", "export", "fast", "verify")
-"""Extras that the main job does without."""
+MAIN_JOB = ("render", "unwrap", "agents")
+"""Extras that the main job needs, `shotenv demo`."""
 
 
 @dataclass(frozen=True)
@@ -49,12 +49,14 @@ def python_itself() -> Finding:
 
 def packages() -> tuple[Finding, ...]:
     """Every package that the main job imports, with its version."""
-    other = re.compile(rf"""extra == ['"]({"|".join(OTHERS)})['"]""")
-    # A requirement reads `numba>=0.60; extra == "sim"`: name, versions, and what it is for.
-    needed = [line for line in requires("shotenv") or () if not other.search(line)]
-    names = {re.split(r"[;\[<>=!~ ]", line)[0] for line in needed}
+    # A requirement reads `mitsuba<4,>=3.7; extra == "render"`: name, versions, and what it is for.
+    names = set()
+    for line in requires("shotenv") or ():
+        extra = re.search(r"""extra == ['"](\w+)['"]""", line)
+        if extra is None or extra.group(1) in MAIN_JOB:
+            names.add(re.split(r"[;\[<>=!~ ]", line)[0])
     found = []
-    for name in sorted(names - {"shotenv"}):
+    for name in sorted(names):
         try:
             found.append(Finding(name, True, version(name)))
         except PackageNotFoundError:
@@ -67,6 +69,8 @@ def torch_build() -> Finding:
     import torch
 
     device = "CUDA" if torch.cuda.is_available() else "CPU"
+    # Of the cores those that this process may use, which a container or `taskset` limits; not every
+    # system can tell.
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     detail = f"{device} build, {torch.get_num_threads()} threads on {cores} cores"
     return Finding("torch build", True, detail)
@@ -90,6 +94,7 @@ def cache_folder() -> Finding:
     from shotenv.bank import cache_dir
 
     folder = cache_dir()
+    # Made at the first bank: until then the nearest folder that exists tells.
     existing = next(path for path in (folder, *folder.parents) if path.is_dir())
     free = shutil.disk_usage(existing).free
     writable = os.access(existing, os.W_OK)
@@ -99,7 +104,7 @@ def cache_folder() -> Finding:
 
 
 def shipped_networks() -> tuple[Finding, ...]:
-    """Whether the weights of the unwrapping networks can be read."""
+    """Whether the weights of the two networks of the paper can be read."""
     from unwrap.networks import load_unwrapper
 
     found = []

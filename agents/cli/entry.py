@@ -40,6 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _run(words)
     except SystemExit as leaving:  # argparse, after --help or --print_config
         return DONE if leaving.code in (None, 0) else WRONG_USAGE
+    # Before ValueError, which it is: what the user typed is at fault, not what was asked for.
     except ConfigError as error:
         return _refuse(str(error), WRONG_USAGE)
     except KeyboardInterrupt:
@@ -53,6 +54,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         return _refuse(f"{where}{error.strerror or error}", FAILED)
+    # What the rooms refuse, and what torch and mitsuba raise; any other error is a fault of this
+    # program and keeps its traceback.
     except (ValueError, RuntimeError) as error:
         return _refuse(one_sentence(error), FAILED)
 
@@ -67,6 +70,7 @@ def _run(words: list[str]) -> int:
         print(version("shotenv"))
         return DONE
     for command in COMMANDS:
+        # No command's words begin another's, so that the first that fits is the one.
         own = command.words.split()
         if words[: len(own)] == own:
             arguments = _parsed(command, words[len(own) :])
@@ -95,6 +99,8 @@ def _parsed(command: Command, words: list[str]) -> Namespace:
 
 def _plain(message: str) -> str:
     """A validation message without what only the libraries' authors need."""
+    # In turn: where jsonargparse found it, pydantic's count of errors, its and jsonargparse's words
+    # for what was expected, and pydantic's note on the value.
     for pattern, kept in (
         (r'Parser key "([^"]+)": ', r"\1: "),
         (r"\d+ validation errors? for [\w-]+ ", ""),
@@ -113,6 +119,7 @@ def _overview(words: list[str]) -> int:
     if not matching:
         known = ", ".join(command.words for command in COMMANDS)
         raise ConfigError(f"command is {' '.join(asked)!r}; expected one of {known}")
+    # Asked for, the list is the answer; without `--help` it says what was wrong.
     stream = sys.stderr if asked == words else sys.stdout
     print("usage: shotenv COMMAND [--help] [arguments]\n", file=stream)
     for command in matching:

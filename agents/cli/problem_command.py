@@ -34,6 +34,7 @@ def measure_configuration(arguments: Namespace) -> int:
             tabulate(problems[split], drive_seeds(config.study, count), tick=bar.update)
             for split, count in counts.items()
         )
+    # Policies are tuned on validation clips and judged on those of the study's split.
     found = measure_problem(validation, test, config.env.reward, config.study)
     print_problem(found, config)
     write_numbers(arguments, found)

@@ -74,6 +74,7 @@ def evaluate(arguments: Namespace) -> int:
     from agents.evaluation import evaluate_scheduler
     from agents.policies import PpoPolicy
 
+    # Loaded first: a folder without a scheduler is refused before a bank is rendered.
     scheduler, config = PpoPolicy.load(arguments.scheduler), experiment_of(arguments)
     prepare_bank(config.env)
     play_on_one_thread()

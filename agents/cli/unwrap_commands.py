@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from jsonargparse import ArgumentParser, Namespace
 
@@ -203,6 +203,8 @@ def export_network(arguments: Namespace) -> int:
     frames = frames_of("test", CHECKED_FRAMES)
     metadata = metadata_of(unwrapper, arguments.merge, sensor, config.sensor.name, size, shots)
     export = CheckedExport(network, frames, metadata)
+    # `write` checks against torch before it writes; the quantised file is calibrated on frames of
+    # training and checked on those of the test.
     found: dict[str, Any] = {"frames": frames.source, "opset": OPSET}
     found["onnx"] = export.write(arguments.out)
     _tell_of_file(found["onnx"])
@@ -216,6 +218,7 @@ def export_network(arguments: Namespace) -> int:
 
 def _image_size(arguments: Namespace) -> tuple[int, int]:
     """Height and width in pixels, checked."""
+    # Assumed limits: below, the networks' coarsest maps have no pixels left; above, memory ends.
     for name in ("height", "width"):
         if not 16 <= arguments[name] <= 4096:
             raise ValueError(f"{name} is {arguments[name]}; expected 16 to 4096 pixels")
@@ -239,9 +242,9 @@ def add_sensor_and_merge(parser: ArgumentParser) -> None:
     from unwrap.depth import Merge
 
     parser.add_argument("--sensor", default="epc660", help="name or path of a sensor configuration")
-    parser.add_argument(
-        "--merge", type=Merge, default="nearest", help="nearest, floor (eq. 6), or none"
-    )
+    # Listed by its type, so that a new rule is told of here as soon as it has a name.
+    rules = ", ".join(get_args(Merge))
+    parser.add_argument("--merge", type=Merge, default="nearest", help=f"merge rule: {rules}")
 
 
 COMMANDS: tuple[Command, ...] = (

@@ -5,13 +5,12 @@ Cost is minus the return; excess is how much more than the optimum a policy cost
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
 
 from agents.config import DemoConfig, StudyConfig
-from agents.evaluation.statistics import excess, interval, mean
+from agents.evaluation.statistics import excess, mean, study_interval
 from agents.optimum import (
     DriveTable,
     PlayedTable,
@@ -28,6 +27,7 @@ from agents.optimum import (
 from shotenv.config import LaserConfig, RewardConfig
 from unwrap.signal import Shots
 
+# Assumed: what there must be to gain for learning a scheduler to be worth its while.
 GOALS: Final = {
     "best_fixed": 0.15,
     "best_blind": 0.12,
@@ -37,6 +37,7 @@ GOALS: Final = {
 """Least excess over the optimum of each kind of policy, for the problem to be worth solving."""
 LEAST_SHARE: Final = 0.10
 """Of the optimum's frames, for each action."""
+# Assumed: from free energy to prices at which always 2 DCS are the optimum.
 SWEEP: Final = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8)
 
 
@@ -86,22 +87,22 @@ def measure_problem(
     found: dict[str, dict[str, Any]] = {
         name: {
             "choice": choice,
-            **_interval(excess, study, played.cost, best.cost, name="excess"),
+            **study_interval(excess, study, played.cost, best.cost).named("excess"),
             "goal": GOALS.get(name),
         }
         for name, (choice, played) in rivals.items()
     }
     working = np.maximum((best.actions >= 0).sum(axis=1), 1)  # frames with laser, of each drive
     shares = {
-        str(shots): _interval(
-            mean, study, (best.actions == shots.action).sum(axis=1) / working, name="mean"
-        )
+        str(shots): study_interval(
+            mean, study, (best.actions == shots.action).sum(axis=1) / working
+        ).named("mean")
         for shots in Shots
     }
     return {
         "drives": len(best.cost),
         "optimum": {
-            "cost_per_drive": _interval(mean, study, best.cost, name="mean"),
+            "cost_per_drive": study_interval(mean, study, best.cost).named("mean"),
             "shots_share": shares,
             "tripped_share": best.tripped_share,
         },
@@ -118,7 +119,8 @@ def _rivals(validation: DriveTable, table: DriveTable) -> dict[str, tuple[str, P
     fixed = {f"always {shots}": always(shots.action) for shots in Shots}
     best_fixed, best_blind = best_choice(table, fixed.items()), best_choice(table, blind.items())
     rule = best_rule(validation)
-    # Of the two that look at nothing but the frame the better one counts.
+    # Of the two that do not look ahead the better one counts: which it is depends on the laser, as
+    # avoiding a trip may cost more than the frames without laser do.
     short_sighted = {
         "least cost of the frame": greedy(table, guarded=False),
         "least cost of the frame that does not trip": greedy(table, guarded=True),
@@ -129,14 +131,6 @@ def _rivals(validation: DriveTable, table: DriveTable) -> dict[str, tuple[str, P
         "threshold_rule": (str(rule), play(table, threshold(*rule))),
         "greedy": min(short_sighted.items(), key=lambda item: item[1].cost.sum()),
     }
-
-
-def _interval(
-    statistic: Callable, study: StudyConfig, *samples: np.ndarray, name: str
-) -> dict[str, float]:
-    return interval(
-        statistic, *samples, draws=study.bootstrap_draws, confidence=study.confidence
-    ).named(name)
 
 
 def _at_weight(test: Possible, weights: RewardConfig, power: float) -> dict[str, Any]:

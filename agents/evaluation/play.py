@@ -15,6 +15,7 @@ from shotenv.config import EnvConfig
 from shotenv.env import ShotScheduleVectorEnv
 from unwrap.signal import Shots
 
+# Objects that all studies share, since they remember nothing.
 FIXED_POLICIES: Final = {f"always_{shots}": FixedPolicy(shots) for shots in Shots}
 
 
@@ -51,6 +52,7 @@ class PlayedDrives:
             "return": self.reward.sum(axis=1),
             "laser_energy_j": self.laser_energy_j.sum(axis=1),
             "energy_j": self.energy_j.sum(axis=1),
+            # Over frames with laser: one without has no depth. The return counts it in full.
             "depth_mae_m": np.nanmean(self.depth_mae_m, axis=1),
             "wrap_accuracy": np.nanmean(self.wrap_accuracy, axis=1),
             "tripped_share": np.mean(self.shots == 0, axis=1),
@@ -65,6 +67,7 @@ class PlayedDrives:
 
 def make_envs(config: EnvConfig, split: str, count: int, mode: str) -> ShotScheduleVectorEnv:
     """`count` environments of `config` on the drives of `split`, with autoreset mode `mode`."""
+    # As keywords, like everyone else's: the environment validates them again.
     fields = config.model_copy(update={"split": split}).model_dump()
     return ShotScheduleVectorEnv(count, autoreset_mode=mode, remember=True, **fields)
 
@@ -97,6 +100,7 @@ def play_drives(
     one_each: Any = list(seeds)  # gymnasium's annotation forgets sequences
     observations, infos = envs.reset(seed=one_each)
     policy.reset()
+    # All drives are equally long: they end in the same step, and no frame of a next one is kept.
     frames: list[dict[str, np.ndarray]] = []
     done = np.zeros(len(seeds), dtype=bool)
     while not done.all():
@@ -106,6 +110,7 @@ def play_drives(
         # Where a drive has ended and the next begun in one step, `infos` tell of the new drive.
         told = infos.get("final_info", infos)
         off = np.asarray(told["shots"]) == 0
+        # Copies, since the environment may write the next step into the same arrays.
         frames.append(
             {
                 "shots": np.array(told["shots"], dtype=np.int64),

@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from scipy.stats import bootstrap
 
+from agents.config import StudyConfig
+
 Statistic = Callable[..., np.ndarray]
 
 
@@ -38,6 +40,11 @@ def mean_difference(a: np.ndarray, b: np.ndarray, axis: int = -1) -> np.ndarray:
 def excess(cost: np.ndarray, reference: np.ndarray, axis: int = -1) -> np.ndarray:
     """How much more `cost` is than `reference`, summed over drives: 0.15 is 15 % more."""
     return np.sum(cost, axis=axis) / np.sum(reference, axis=axis) - 1.0
+
+
+def study_interval(statistic: Statistic, study: StudyConfig, *samples: np.ndarray) -> Interval:
+    """`interval` with the draws and the confidence of a study."""
+    return interval(statistic, *samples, draws=study.bootstrap_draws, confidence=study.confidence)
 
 
 def interval(
@@ -76,7 +83,8 @@ def interval(
         raise ValueError("samples hold a value that is not finite; expected one number per drive")
     point = float(statistic(*arrays, axis=-1))
     # BCa divides by the spread over samples with one drive left out; it is 0 where a policy does
-    # the same in every drive, as always 2 DCS does in its share of shots.
+    # the same in every drive, as always 2 DCS does in its share of shots. scipy would answer with
+    # a warning and NaN.
     kept = ~np.eye(arrays[0].size, dtype=bool)
     one_left_out = [float(statistic(*(array[row] for array in arrays), axis=-1)) for row in kept]
     if np.allclose(one_left_out, point, rtol=1e-12, atol=1e-15):
@@ -89,7 +97,7 @@ def interval(
         n_resamples=draws,
         confidence_level=confidence,
         method="BCa",
-        batch=1000,
+        batch=1000,  # resamples held in memory at a time
         rng=np.random.default_rng(seed),
     ).confidence_interval
     return Interval(point, float(result.low), float(result.high))

@@ -58,6 +58,7 @@ def tune_rule(config: DemoConfig) -> SnrThresholdPolicy:
     with progress(frames, "tuning the threshold rule", "frame") as bar:
         possible = tabulate(problem, seeds, tick=bar.update)
     rule = best_rule(possible.table(config.env.reward))
+    # Shots here, actions there: a policy is told what it takes, a table is indexed.
     below, above = rule.shots
     return SnrThresholdPolicy(FEATURE_NAMES, rule.limit, below=below, above=above)
 
@@ -66,7 +67,7 @@ def baselines(config: DemoConfig) -> dict[str, Policy]:
     """What a scheduler is compared with; the rule is tuned here."""
     return {
         "snr_threshold": tune_rule(config),
-        "cycle": CyclePolicy(4, shots=8, otherwise=2),
+        "cycle": CyclePolicy(4, shots=8, otherwise=2),  # assumed: 3.5 samples a frame
         "random": RandomPolicy(config.study.seed),
         "always_8_guarded": GuardedPolicy(FixedPolicy(8), thermal_guard(config)),
         **FIXED_POLICIES,
@@ -76,6 +77,8 @@ def baselines(config: DemoConfig) -> dict[str, Policy]:
 def play_all(config: DemoConfig, policies: Mapping[str, Policy]) -> dict[str, PlayedDrives]:
     """Every policy on the same test drives."""
     seeds = drive_seeds(config.study, config.study.drives)
+    # The same environments for all, which remember what they measured: noise depends on drive and
+    # frame alone, so that policies that take the same shots of a frame share its cost.
     envs = make_envs(config.env, config.study.split, len(seeds), "Disabled")
     frames = len(policies) * len(seeds) * config.env.frames_per_drive
     with progress(frames, f"evaluating on {config.study.split} drives", "frame") as bar:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any, Final
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from agents.config import StudyConfig
 from agents.evaluation.play import FIXED_POLICIES, PlayedDrives
-from agents.evaluation.statistics import Interval, interval, mean, mean_difference
+from agents.evaluation.statistics import Interval, mean, mean_difference, study_interval
 
 PACKAGES: Final = (
     "shotenv",
@@ -49,13 +49,14 @@ def summary(
     scheduler : str
         Name of the policy that was trained.
     """
+    # Both are picked on the drives that are judged, which favours them, not the scheduler.
     fixed, rival = best_fixed(played), best_rival(played, scheduler)
     families = sorted(set(played[fixed].family.ravel().tolist()))
     return {
         "policies": {
             name: {
                 **{
-                    measure: _interval(mean, study, values).named("mean")
+                    measure: study_interval(mean, study, values).named("mean")
                     for measure, values in one.per_drive.items()
                 },
                 "shots_share": one.shots_share(),
@@ -85,11 +86,8 @@ def summary(
 
 def difference(one: PlayedDrives, other: PlayedDrives, study: StudyConfig) -> Interval:
     """Mean difference of the returns, drive by drive, one minus other."""
-    return _interval(mean_difference, study, one.per_drive["return"], other.per_drive["return"])
-
-
-def _interval(statistic: Callable, study: StudyConfig, *samples: np.ndarray) -> Interval:
-    return interval(statistic, *samples, draws=study.bootstrap_draws, confidence=study.confidence)
+    returns = one.per_drive["return"], other.per_drive["return"]
+    return study_interval(mean_difference, study, *returns)
 
 
 def drive_rows(played: Mapping[str, PlayedDrives]) -> list[dict[str, Any]]:
@@ -133,6 +131,7 @@ def timeline(
         "policies": {
             name: {
                 "shots": one.shots[drive].tolist(),
+                # JSON knows no NaN.
                 "depth_mae_m": [None if np.isnan(x) else float(x) for x in one.depth_mae_m[drive]],
                 "temperature_k": one.temperature_k[drive].tolist(),
             }

@@ -16,7 +16,7 @@ Name = TypeVar("Name")
 
 
 class Rule(NamedTuple):
-    """Parameters of a one-threshold rule: actions below and above `limit`."""
+    """Parameters of a one-threshold rule: its limit, and the actions (0 to 2) on either side."""
 
     limit: float
     below: int
@@ -48,6 +48,7 @@ def mixture(shares: tuple[float, float, float], *, seed: int = 0) -> Choice:
     edges = np.cumsum(shares)[:-1]
 
     def choose(now: Situation) -> np.ndarray:
+        # Seeded by the frame, so that a choice keeps no state and plays alike however often.
         draw = np.random.default_rng((seed, now.frame)).random(now.snr.shape)
         return np.searchsorted(edges, draw, side="right")
 
@@ -61,6 +62,8 @@ def threshold(limit: float, below: int, above: int) -> Choice:
 
 def threshold_choices(table: DriveTable, limits: int = 40) -> Iterator[tuple[Rule, Choice]]:
     """Every pair of actions in either order, with thresholds at quantiles of the feature."""
+    # Quantiles, for as many frames between two limits wherever the feature's values crowd. Those
+    # of 0 and 1 are left out: beyond the extremes a rule is a fixed choice.
     quantiles = np.quantile(table.snr, np.linspace(0.01, 0.99, limits))
     for limit, (below, above) in itertools.product(
         np.unique(quantiles).tolist(), itertools.permutations(range(3), 2)
@@ -80,9 +83,12 @@ def blind_choices(longest: int = 8, steps: int = 5) -> Iterator[tuple[str, Choic
     for length, (one, rest) in itertools.product(
         range(2, longest + 1), itertools.permutations(Shots, 2)
     ):
+        # The special frame comes first; in drives of hundreds of frames its place hardly matters.
         pattern = one.action, *[rest.action] * (length - 1)
         yield f"{one} every {length} frames, else {rest}", cycle(pattern)
     for two, four in itertools.product(range(1, steps), repeat=2):
+        # Of the grid of shares that sum to 1, those in which each action has its part: the others
+        # are fixed choices, or close to cycles.
         if two + four < steps:
             shares = (two / steps, four / steps, 1 - (two + four) / steps)
             yield "mixture {:.0%}/{:.0%}/{:.0%} of 2/4/8".format(*shares), mixture(shares)

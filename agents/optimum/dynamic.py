@@ -30,6 +30,8 @@ def clairvoyant(table: DriveTable, *, levels: int = 801, rise_levels: int = 25) 
     `levels` temperatures of the case; with a junction stage a quarter of them, times `rise_levels`
     rises of the junction.
     """
+    # 801 levels over some 35 K lie 0.04 K apart; 2, 4 and 8 DCS warm the shipped laser by at most
+    # 0, 0.2 and 0.6 K more a frame near its trip. A coarser grid would blur which of them trips.
     # Without a junction stage there is one rise, 0, and the case has all the levels to itself.
     stages = bool(table.highest_rise_k)
     grid = _Grid(
@@ -40,6 +42,7 @@ def clairvoyant(table: DriveTable, *, levels: int = 801, rise_levels: int = 25) 
 
     def choose(now: Situation) -> np.ndarray:
         """Action of least cost now plus least cost from then on."""
+        # Bellman's equation at the laser's true temperature: the grid enters by `to_go` alone.
         to_go = _look_up(values[now.frame + 1], _corners(grid, table.consequences(now.laser)))
         return np.argmin(now.cost + to_go, axis=-1)
 
@@ -76,7 +79,10 @@ class _Grid(NamedTuple):
 
 
 def _values_to_go(table: DriveTable, grid: _Grid) -> np.ndarray:
-    """Least cost from each frame on, [T + 1, 2 (tripped), N, case levels, rise levels]."""
+    """Least cost from each frame on, [T + 1, 2 (tripped), N, case levels, rise levels].
+
+    Backward induction: nothing is left to pay after the last frame.
+    """
     drives, frames, _ = table.cost.shape
     shape = drives, grid.case_k.size, grid.rise_k.size
     values = np.zeros((frames + 1, 2, *shape))
@@ -93,42 +99,48 @@ def _values_to_go(table: DriveTable, grid: _Grid) -> np.ndarray:
 
 
 class _Corners(NamedTuple):
-    """Points of the grid around some lasers [N, ...]: where they are stored, and their weights.
+    """Points of the grid that surround the temperatures of lasers [N, ...], for interpolation.
 
-    Both are [2 or 4, N, ...].
+    Attributes
+    ----------
+    position : int64 [2 or 4, N, ...]
+        Into the flattened values of a frame, [2 (tripped), N, case levels, rise levels]; 2 points
+        without a junction stage, 4 with one.
+    weight : float64 [2 or 4, N, ...]
+        Sum to 1 over the points.
     """
 
-    stored: np.ndarray
+    position: np.ndarray
     weight: np.ndarray
 
 
 def _corners(grid: _Grid, laser: ThermalState) -> _Corners:
-    """The grid points that a value is interpolated from."""
+    """Bilinear interpolation in the temperatures; on and tripped lasers are never mixed."""
     case_k, rise_k, tripped = np.broadcast_arrays(*laser)
     drive = np.arange(len(case_k)).reshape(-1, *[1] * (case_k.ndim - 1))
-    # Indices into the flattened values [2 (tripped), N, case levels, rise levels].
     row = (tripped * len(case_k) + drive) * grid.case_k.size
-    stored, weight = zip(
+    position, weight = zip(
         *(
-            ((row + case) * grid.rise_k.size + rise, near * close)
-            for case, near in _ends(grid.case_k, case_k)
-            for rise, close in _ends(grid.rise_k, rise_k)
+            ((row + case) * grid.rise_k.size + rise, case_weight * rise_weight)
+            for case, case_weight in _neighbours(grid.case_k, case_k)
+            for rise, rise_weight in _neighbours(grid.rise_k, rise_k)
         ),
         strict=True,
     )
-    return _Corners(np.stack(stored), np.stack(weight))
+    return _Corners(np.stack(position), np.stack(weight))
 
 
 def _look_up(values: np.ndarray, corners: _Corners) -> np.ndarray:
     """Interpolate values [2, N, case levels, rise levels] of the grid."""
-    return (values.reshape(-1).take(corners.stored) * corners.weight).sum(axis=0)
+    return (values.reshape(-1).take(corners.position) * corners.weight).sum(axis=0)
 
 
-def _ends(axis: np.ndarray, value: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Grid levels around each value: their index and weight."""
+def _neighbours(axis: np.ndarray, value: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """The levels below and above each value: their index and weight; one where there is but one."""
     if axis.size == 1:
         return [(np.zeros(value.shape, np.int64), np.ones(value.shape))]
     position = np.clip((value - axis[0]) / (axis[1] - axis[0]), 0.0, axis.size - 1.0)
+    # A value on the last level lies between the last two, with all the weight on the upper.
     below = np.minimum(position.astype(np.int64), axis.size - 2)
     share = position - below
     return [(below, 1.0 - share), (below + 1, share)]

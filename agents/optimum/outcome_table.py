@@ -1,4 +1,4 @@
-"""Everything that drives can turn out to be, and choices played on it.
+"""Drives as tables, what each action brings in each frame, and choices played on them.
 
 N drives, T frames, A = 3 actions throughout; temperatures in kelvin, heat in joules.
 """
@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+# A policy on a table. Not `Policy`, which sees observations alone: the clairvoyant sees the costs.
 Choice = Callable[["Situation"], np.ndarray]
 """From what is known before a frame to the action of each drive, int64 [N]."""
 
@@ -36,7 +37,11 @@ Advance = Callable[[ThermalState, np.ndarray], ThermalState]
 
 @dataclass(frozen=True)
 class DriveTable:
-    """Everything that drives can turn out to be.
+    """What each action would cost, heat and tell in every frame of N drives.
+
+    A row of `cost` such as (0.31, 0.24, 0.29) says that in this frame 4 DCS are best. Its numbers
+    do not depend on the actions before: the noise is that of the frame, and what a warm laser adds
+    is left to `surplus`.
 
     Attributes
     ----------
@@ -52,7 +57,7 @@ class DriveTable:
     heat_j : float64 [N, A]
         Heat that each action leaves in the laser, at 25 C.
     start_k : float64 [N]
-        ThermalState temperature before the first frame.
+        Temperature of case and junction before the first frame.
     snr : float64 [N, T, A]
         The observed feature `signal_to_noise` after each action.
     span_k : (low, high)
@@ -76,21 +81,26 @@ class DriveTable:
     advance: Advance
 
     def cost_at(self, frame: int, temperature_k: np.ndarray) -> np.ndarray:
-        """Cost of each action at junction temperatures [N, ...]: [N, ..., A]."""
+        """Cost of each action at junction temperatures [N, ...]: [N, ..., A].
+
+        One temperature a drive when it is played, all temperatures of the grid for the optimum.
+        """
         surplus = np.expand_dims(self.surplus(temperature_k), -1)
         cost, laser_cost = (
-            beside(values, temperature_k) for values in (self.cost[:, frame], self.laser_cost)
+            _for_each_state(values, temperature_k)
+            for values in (self.cost[:, frame], self.laser_cost)
         )
         return cost + laser_cost * surplus
 
     def consequences(self, laser: ThermalState) -> ThermalState:
         """The lasers [N, ...] one frame later, after each action: [N, ..., A]."""
-        heat_j = beside(self.heat_j, laser.case_k)
+        heat_j = _for_each_state(self.heat_j, laser.case_k)
         before = ThermalState(*(np.expand_dims(value, -1) for value in laser))
         return self.advance(before, np.where(before.tripped, 0.0, heat_j))
 
     def start(self) -> ThermalState:
         """The lasers before the first frame."""
+        # Long off: the junction is as cold as the case. A copy, since tables are not to change.
         none = np.zeros(len(self.start_k))
         return ThermalState(self.start_k.copy(), none, none.astype(bool))
 
@@ -141,6 +151,7 @@ class PlayedTable:
     def shares(self) -> np.ndarray:
         """Share of each action among the frames with laser, [A]."""
         chosen = self.actions[self.actions >= 0]
+        # Without any such frame all shares are 0, not undefined.
         return np.bincount(chosen, minlength=3) / max(chosen.size, 1)
 
     @property
@@ -166,6 +177,6 @@ def play(table: DriveTable, choose: Choice) -> PlayedTable:
     return PlayedTable(actions, cost)
 
 
-def beside(values: np.ndarray, states: np.ndarray) -> np.ndarray:
-    """Values [N, A] of each drive for states [N, ...] of it: [N, ..., A], broadcast."""
+def _for_each_state(values: np.ndarray, states: np.ndarray) -> np.ndarray:
+    """Values [N, A] of N drives as [N, 1, ..., A], to broadcast with states [N, ...] of them."""
     return values.reshape(len(values), *[1] * (states.ndim - 1), -1)

@@ -1,4 +1,4 @@
-"""From the environment's problem to the table of everything that its drives can turn out to be."""
+"""Outcome tables of the environment's drives: every action taken in every frame."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ SNR_COLUMN = [feature.name for feature in SEEN_FEATURES].index(SNR_FEATURE)
 
 @dataclass(frozen=True)
 class Possible:
-    """Drives and everything that could happen in them, before the reward weighs it.
+    """Drives and the outcome of each action in every frame, before the reward weighs it.
+
+    Playing every action is the slow part; weighing what came of it is not, so that one serves many
+    prices of power.
 
     Attributes
     ----------
@@ -47,7 +50,8 @@ class Possible:
     def table(self, weights: RewardConfig) -> DriveTable:
         """The table that choices are played on, with these reward weights.
 
-        Nothing derates the laser in it.
+        Without derating: power that follows the temperature would change what is measured, and
+        the outcomes would depend on the actions before.
         """
         period_s, laser = self.problem.frame_period_s, self.problem.config.laser
         ambient_k = np.array([float(drive.ambient_k) for drive in self.drives])
@@ -92,6 +96,7 @@ def tabulate(
 
 def drive_of(problem: Problem, seed: int) -> Drive:
     """The first drive of an environment after `reset(seed=seed)`."""
+    # Gymnasium's own way from a seed to the generator of an environment, then the environment's.
     generator, _ = seeding.np_random(seed)
     bank, config = problem.bank, problem.config
     return draw_drive(
@@ -106,6 +111,7 @@ def drive_of(problem: Problem, seed: int) -> Drive:
 
 def energy_surplus(temperature_k: np.ndarray, laser: LaserConfig) -> np.ndarray:
     """Share by which light takes more electrical energy at a temperature than at 25 C."""
+    # One zero broadcasts with everything: most lasers here have no slope, and grids are large.
     if not laser.efficiency_slope_per_k:
         return np.zeros(1)
     return laser.efficiency / efficiency_at(temperature_k, laser) - 1.0
@@ -141,7 +147,10 @@ def _hottest_j(heat_j: np.ndarray, laser: LaserConfig) -> float:
 def _span_k(
     ambient_k: np.ndarray, heat_j: np.ndarray, laser: LaserConfig, period_s: float
 ) -> tuple[float, float]:
-    """Coldest ambient, and what the hottest frame makes of a laser about to trip."""
+    """Coldest ambient, and what the hottest frame makes of a laser about to trip.
+
+    A laser starts at the ambient temperature or above, and no frame heats one that has tripped.
+    """
     hottest_j = _hottest_j(heat_j, laser)
     hottest = case_step(laser.trip_k, hottest_j, ambient_k, laser, period_s)
     return float(ambient_k.min()), max(float(hottest.max()), laser.trip_k)

@@ -13,7 +13,7 @@ from agents.policies.policy import (
     Policy,
     batch_shape,
     checked_shots,
-    like,
+    same_action,
     single,
 )
 from unwrap.signal import Shots
@@ -33,7 +33,7 @@ class FixedPolicy(Policy):
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
         """The same action, whatever is observed."""
-        return like(observation, self.action)
+        return same_action(observation, self.action)
 
 
 class RandomPolicy(Policy):
@@ -72,7 +72,7 @@ class CyclePolicy(Policy):
         """The action that the frame's place in the cycle asks for."""
         special = self._frame % self._period == 0
         self._frame += 1
-        return like(observation, (self._shots if special else self._otherwise).action)
+        return same_action(observation, (self._shots if special else self._otherwise).action)
 
     def reset(self) -> None:
         """Start the cycle at its first frame."""
@@ -80,6 +80,7 @@ class CyclePolicy(Policy):
 
     def __str__(self) -> str:
         """The rule in words."""
+        # 11th, 12th and 13th, though 1st, 2nd and 3rd; so, too, 111th.
         teens = 10 < self._period % 100 < 20
         ending = "th" if teens else {1: "st", 2: "nd", 3: "rd"}.get(self._period % 10, "th")
         return f"{self._shots} DCS every {self._period}{ending} frame, else {self._otherwise}"

@@ -41,7 +41,8 @@ class ThermalGuard:
     def __call__(self, observation: Any, actions: Any) -> np.ndarray:
         """The actions [N] (or []) that are allowed in place of `actions`."""
         margin_k = heat_margin_k(np.asarray(observation)[..., self._index])
-        # The margins rise with the shots, so counting those that are met gives the highest action.
+        # The margins rise with the shots, so counting those that are met gives the highest action;
+        # the first is not asked for, since fewer than 2 samples cannot be taken.
         highest = sum((margin_k >= needed).astype(np.int64) for needed in self.needed_k[1:])
         return np.minimum(actions, highest)
 
@@ -55,14 +56,18 @@ def thermal_guard(config: DemoConfig) -> ThermalGuard:
 def largest_rises_k(config: EnvConfig) -> tuple[float, ...]:
     """What each action can warm the laser by in one frame at most, kelvin.
 
-    That is, near the trip, in a drive with the hottest surroundings, the strongest laser and the
-    longest integration. Every warmer laser rises less, so the release temperature bounds them all.
+    That is, in a drive with the hottest surroundings, the strongest laser and the longest
+    integration. One frame is worth more kelvin the colder the laser is, since a warm one also loses
+    more to its surroundings; only lasers near the trip matter, and the release temperature, which
+    lies below it, bounds their rises from above.
     """
     laser, shots = config.laser, torch.tensor([int(shots) for shots in Shots])
 
     def every(value: float) -> torch.Tensor:
         return torch.full(shots.shape, value, dtype=torch.float64)
 
+    # Two temperatures on purpose, each the worst: a hot laser turns more of its energy into heat, a
+    # cold one keeps more of the heat.
     cost = shot_cost(
         shots,
         laser,

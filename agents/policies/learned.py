@@ -79,7 +79,9 @@ class PpoPolicy(Policy):
             guard_needed_k=self.guard.needed_k,
             versions={name: version(name) for name in ("stable-baselines3", "torch")},
         )
+        # safetensors refuses tensors that do not lie in one piece.
         tensors = {name: value.contiguous() for name, value in self.network.state_dict().items()}
+        # The description comes last: a folder that has it has the weights, too.
         write_bytes(folder / WEIGHTS, save(tensors))
         write_json(
             folder / DESCRIPTION, {"schema": AGENT_SCHEMA, **description.model_dump(mode="json")}
@@ -119,14 +121,18 @@ def build_network(features: int, config: AgentConfig) -> ActorCriticPolicy:
 
     observed = Box(-np.inf, np.inf, (features,), np.float32)
     network = ActorCriticPolicy(
-        observed, Discrete(len(Shots)), lambda _: config.learning_rate, **network_arguments(config)
+        # The rate serves the optimiser, which the class makes in any case and nothing here uses.
+        observed,
+        Discrete(len(Shots)),
+        lambda _: config.learning_rate,
+        **network_arguments(config),
     )
     network.set_training_mode(False)
     return network
 
 
 def network_arguments(config: AgentConfig) -> dict[str, Any]:
-    """What PPO and `build_network` both need to make the same network."""
+    """Arguments of stable-baselines3's actor and critic, for PPO and `build_network` alike."""
     return {"net_arch": list(config.hidden)}
 
 
@@ -141,12 +147,14 @@ def read_description(path: Path) -> Description:
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
+        # Looked at before the fields: those of another version may have other names.
         schema = content.pop("schema")
     except FileNotFoundError:
         raise ValueError(
             f"{path.parent} holds no scheduler ({path.name} is missing); "
             "`shotenv train --out DIR` makes one"
         ) from None
+    # The last three: JSON that is no table, or a table without a schema.
     except (UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError, AttributeError):
         raise ValueError(f"{path} is damaged; expected the description of a scheduler") from None
     if schema != AGENT_SCHEMA:

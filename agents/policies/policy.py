@@ -14,6 +14,8 @@ import numpy as np
 
 from unwrap.signal import Shots
 
+# Any, because both come in two shapes: of one environment (an int; float32 [D]) and of a batch of N
+# (int64 [N]; float32 [N, D], or a dictionary that has it as "state").
 Action = Any
 Observation = Any
 
@@ -23,7 +25,7 @@ class Policy(ABC):
 
     Examples
     --------
-    A policy of your own is a class with `act`:
+    A policy of your own is a class with `act`; `single` makes one code serve one and many:
 
     >>> class Dim(Policy):
     ...     def act(self, observation, info=None):
@@ -59,11 +61,12 @@ def batch_shape(observation: Observation) -> tuple[int, ...]:
     return np.shape(features)[:-1]
 
 
-def like(observation: Observation, action: int) -> Action:
-    """`action` for one environment or for each of a batch, as `observation` has it."""
+def same_action(observation: Observation, action: int) -> Action:
+    """`action` for the one environment, or for each of the batch, that `observation` is of."""
     return single(np.full(batch_shape(observation), action, dtype=np.int64))
 
 
 def single(actions: np.ndarray | np.integer) -> Action:
-    """A Python int where there is no batch."""
+    """Actions [N] as they are; of one environment, [], a Python int."""
+    # Not an array of no dimensions: JSON, `is` and list indices of callers want a plain number.
     return int(actions) if np.ndim(actions) == 0 else np.asarray(actions)

@@ -21,7 +21,8 @@ class SnrThresholdPolicy(Policy):
     feature_names : sequence of str
         `env.unwrapped.feature_names`, to find the ratio in the observation.
     threshold : float
-        Compared with the feature as observed, that is after the environment's scaling.
+        Compared with the feature as observed: q / (q + 1) of each pixel, q its amplitude over four
+        standard deviations of a sample, averaged; a pixel at four has 0.5.
     below, above : int
         Shots where the ratio is below, and at or above, the threshold.
     """

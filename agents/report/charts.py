@@ -15,7 +15,9 @@ SHOT_COLORS = {Shots.TWO: "#9ecae1", Shots.FOUR: "#4292c6", Shots.EIGHT: "#08407
 LEVELS = (0, *Shots)
 """Samples taken, bottom to top of the time line; 0: the laser was off."""
 SYMBOLS = {"ppo": "star", "snr_threshold": "diamond", "random": "x", "cycle": "square"}
+# The colours of the page's style sheet, `report.html.jinja`.
 ACCENT, MUTED, INK = "#c2410c", "#64748b", "#1e293b"
+# Of the families that networks and schedulers are trained on; others share one gray.
 FAMILY_COLORS = {
     "sunny_road": "#fde68a",
     "overcast_street": "#d6dde6",
@@ -23,6 +25,7 @@ FAMILY_COLORS = {
     "tunnel": "#cfd3dd",
     "night_road": "#b7bfdc",
 }
+# The first of these that the reader's machine has: nothing is loaded.
 FONT = {"family": "Inter, system-ui, 'Segoe UI', Roboto, sans-serif", "size": 13, "color": INK}
 AXIS = {"gridcolor": "#e2e8f0", "zeroline": False}
 LEGEND = {"orientation": "h", "x": 1.0, "xanchor": "right", "y": 1.12, "yanchor": "bottom"}
@@ -36,6 +39,7 @@ def figure_html(figure: go.Figure) -> str:
 
 def error_against_energy(results: dict[str, Any]) -> go.Figure:
     """Depth error against laser energy, one marker with two intervals per policy."""
+    # Labels are placed by hand: plotly lets those of policies that lie close overlap.
     figure = go.Figure()
     by_energy = sorted(
         results["policies"].items(), key=lambda item: item[1]["laser_energy_j"]["mean"]
@@ -89,6 +93,7 @@ def shares_by_family(results: dict[str, Any], names: tuple[str, ...]) -> go.Figu
     for column, name in enumerate(names, start=1):
         shares = {"all frames": results["policies"][name]["shots_share"]}
         shares |= results["families"][name]
+        # plotly draws the first bar lowest.
         families = [_family(family) for family in reversed(shares)]
         table = np.array(list(reversed(shares.values())))
         for shots, color in SHOT_COLORS.items():
@@ -101,6 +106,7 @@ def shares_by_family(results: dict[str, Any], names: tuple[str, ...]) -> go.Figu
                 legendgroup=str(shots),
                 showlegend=column == 1,
                 marker={"color": color, "line": {"color": "white", "width": 1}},
+                # In a narrower bar the number would not fit.
                 text=[f"{share:.0%}" if share >= 0.08 else "" for share in share_of_shots],
                 textposition="inside",
                 insidetextanchor="middle",
@@ -149,7 +155,8 @@ def timeline(record: dict[str, Any], scheduler: str, fixed: str) -> go.Figure:
     figure.update_yaxes(
         title="shots", tickvals=list(range(len(LEVELS))), ticktext=names, row=1, **AXIS
     )
-    figure.update_yaxes(range=[-0.35, 3.35], row=1)
+    # A little beyond the lowest and the highest level: lines on the edge would be cut in half.
+    figure.update_yaxes(range=[-0.35, len(LEVELS) - 0.65], row=1)
     figure.update_yaxes(title="depth error, m", rangemode="tozero", row=2, **AXIS)
     figure.update_yaxes(title="laser, °C", row=3, **AXIS)
     figure.update_xaxes(showgrid=False, zeroline=False)
@@ -207,6 +214,7 @@ def _family_bands(figure: go.Figure, families: list[str], frame_rate_hz: float) 
         color = FAMILY_COLORS.get(families[start], "#e2e8f0")
         shape = {"fillcolor": color, "opacity": 0.38, "line_width": 0, "layer": "below"}
         figure.add_vrect(**band, **shape)
+        # A clip of less than a twentieth of the drive is too narrow for its name.
         if end - start >= len(families) / 20:
             figure.add_annotation(
                 x=(band["x0"] + band["x1"]) / 2,

@@ -28,6 +28,7 @@ def write_evaluation(evaluation: Evaluation, config: DemoConfig, folder: Path) -
     scheduler = played[results["scheduler"]]
     compared = {name: played[name] for name in (results["scheduler"], results["best_fixed"])}
     laser, rate_hz = config.env.laser, config.env.frame_rate_hz
+    # One drive, by a rule and not by hand: the page shows no drive that someone picked.
     shown = drive_to_show(scheduler)
     write_json(folder / TIMELINE, timeline(compared, shown, rate_hz, laser.trip_k, laser.release_k))
     write_drives(folder / DRIVES, drive_rows(played))

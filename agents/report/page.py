@@ -17,6 +17,7 @@ from agents.report.results import (
     RESULTS,
     TIMELINE,
     Strip,
+    interval_in_words,
     label,
     read_json,
     read_strip,
@@ -28,8 +29,10 @@ from unwrap.signal import GRAY_FULL_SCALE
 from unwrap.support import write_text
 
 REPORT = "report.html"
-LARGEST_ERROR_M = 1.0
-GRAY_GAMMA = 0.5  # a linear image is too dark to look at
+LARGEST_ERROR_M = 1.0  # assumed: a wrong wrap is six times that, a right one a tenth
+GRAY_GAMMA = 0.5  # assumed: a linear image is too dark to look at
+MINUS = "\u2212"
+"""As wide as a plus; the cards set their numbers large."""
 
 
 def write_report(folder: Path) -> Path:
@@ -58,16 +61,16 @@ def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip) -
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,
-        undefined=jinja2.StrictUndefined,
+        undefined=jinja2.StrictUndefined,  # by default a misspelt name would print nothing
     )
     panels = panels_of(strip, results["config"]["env"]["sensor"]["f1_hz"])
     scheduler, fixed = results["scheduler"], results["best_fixed"]
+    # The rule is what the scheduler has to be better than to be worth its training.
     compared = tuple(name for name in (scheduler, "snr_threshold") if name in results["policies"])
     return environment.get_template("report.html.jinja").render(
         results=results,
         verdict=verdict(results),
         rival_note=rival_note(results),
-        label=label,
         rows=_rows(results),
         cards=_cards(results),
         panels=[{"key": key, "title": panel.title, **panel.scale} for key, panel in panels.items()],
@@ -79,7 +82,7 @@ def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip) -
         drive=played["drive"],
         split=results["config"]["study"]["split"],
         shot_colors={str(shots): color for shots, color in charts.SHOT_COLORS.items()},
-        plotly=get_plotlyjs(),
+        plotly=get_plotlyjs(),  # all 4 MB of it: the page is read without a network
     )
 
 
@@ -88,12 +91,11 @@ def _rows(results: dict[str, Any]) -> list[dict[str, Any]]:
     ordered = sorted(results["policies"].items(), key=lambda item: -item[1]["return"]["mean"])
     return [
         {
-            "name": name,
             "label": label(name),
             "chosen": name == results["scheduler"],
             "fixed": name == results["best_fixed"],
             "paired": results["paired_to_best_fixed"].get(name),
-            "rule": None,
+            "rule": None,  # where the policy has none of its own
             **policy,
         }
         for name, policy in ordered
@@ -109,9 +111,8 @@ def _cards(results: dict[str, Any]) -> list[dict[str, str]]:
     return [
         {
             "title": "Return, difference",
-            "value": f"{pair['difference']:+.1f}".replace("-", "\u2212"),
-            "note": f"{results['confidence']:.0%} interval {pair['low']:+.1f} to "
-            f"{pair['high']:+.1f}".replace("-", "\u2212"),
+            "value": f"{pair['difference']:+.1f}".replace("-", MINUS),
+            "note": interval_in_words(results["confidence"], pair).replace("-", MINUS),
         },
         _card("Laser energy", "J", scheduler["laser_energy_j"], fixed["laser_energy_j"], against),
         _card("Depth error", "m", scheduler["depth_mae_m"], fixed["depth_mae_m"], against),
@@ -124,13 +125,11 @@ def _cards(results: dict[str, Any]) -> list[dict[str, str]]:
 
 
 def _card(title: str, unit: str, ours: dict, theirs: dict, against: str) -> dict[str, str]:
-    change = ours["mean"] / theirs["mean"] - 1.0
+    change = f"{ours['mean'] / theirs['mean'] - 1.0:+.0%}".replace("-", MINUS)
     return {
         "title": title,
         "value": f"{ours['mean']:.3g} {unit}",
-        "note": f"{change:+.0%} against {against} ({theirs['mean']:.3g} {unit})".replace(
-            "-", "\u2212"
-        ),
+        "note": f"{change} against {against} ({theirs['mean']:.3g} {unit})",
     }
 
 

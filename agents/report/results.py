@@ -22,6 +22,7 @@ from unwrap.support import write_bytes, write_text
 
 CURE = "`shotenv evaluate` writes it"
 RESULTS, DRIVES, TIMELINE, FRAMES = "results.json", "drives.csv", "timeline.json", "frames.npz"
+# Policies without a line here are shown by their names, without underscores.
 LABELS = {
     "ppo": "PPO scheduler",
     "snr_threshold": "SNR threshold rule",
@@ -77,10 +78,10 @@ def label(name: str) -> str:
 
 
 def verdict(results: dict[str, Any]) -> str:
-    """Whether the scheduler beats the best fixed choice, in one sentence that hides nothing."""
+    """Whether the scheduler beats the best fixed choice: one sentence with its interval."""
     scheduler, fixed = results["scheduler"], results["best_fixed"]
     pair = results["paired_to_best_fixed"][scheduler]
-    interval = f"{results['confidence']:.0%} interval {pair['low']:+.1f} to {pair['high']:+.1f}"
+    interval = interval_in_words(results["confidence"], pair)
     against = f"the best fixed choice, {_in_a_sentence(fixed)}"
     drives = f"over {results['drives']} {results['config']['study']['split']} drives"
     if pair["low"] <= 0.0 <= pair["high"]:
@@ -102,7 +103,7 @@ def verdict(results: dict[str, Any]) -> str:
 def rival_note(results: dict[str, Any]) -> str:
     """How the scheduler does against the strongest other policy, in one sentence."""
     pair, rival = results["paired_to_best_rival"], _in_a_sentence(results["best_rival"])
-    interval = f"{results['confidence']:.0%} interval {pair['low']:+.1f} to {pair['high']:+.1f}"
+    interval = interval_in_words(results["confidence"], pair)
     known = "" if pair["low"] * pair["high"] > 0.0 else ", which includes zero"
     return (
         f"Against the strongest of the other policies, {rival}, its return is "
@@ -110,7 +111,19 @@ def rival_note(results: dict[str, Any]) -> str:
     )
 
 
+def interval_in_words(confidence: float, pair: dict[str, float]) -> str:
+    """The interval of a difference of returns.
+
+    Examples
+    --------
+    >>> interval_in_words(0.95, {"difference": 0.6, "low": -0.2, "high": 1.25})
+    '95% interval -0.2 to +1.2'
+    """
+    return f"{confidence:.0%} interval {pair['low']:+.1f} to {pair['high']:+.1f}"
+
+
 def _in_a_sentence(name: str) -> str:
+    # Labels begin with a capital; abbreviations keep theirs.
     return label(name).lower().replace("dcs", "DCS").replace("snr", "SNR")
 
 
@@ -139,6 +152,7 @@ def read_strip(path: Path) -> Strip:
         The file is missing or damaged.
     """
     try:
+        # Opened here: numpy leaves the file open where it is no archive.
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             return Strip(**{name: archive[name] for name in archive.files})
     except Exception as error:  # zipfile, zlib, numpy and missing keys each raise their own

@@ -15,7 +15,7 @@ from shotenv.decision import Problem, acquire_depth
 from shotenv.laser import emitted_power_w
 from unwrap.signal import Shots, unambiguous_range_m
 
-FRAMES_PER_FAMILY = 8
+FRAMES_PER_FAMILY = 8  # assumed: enough to see the scene move, in a page of some MB
 
 
 def take_strip(problem: Problem, played: PlayedDrives) -> Strip:
@@ -25,7 +25,8 @@ def take_strip(problem: Problem, played: PlayedDrives) -> Strip:
     images = []
     for row, frame in chosen:
         drive, step = drives[row], torch.tensor([frame])
-        # A derated laser's power follows its temperature before the frame.
+        # A derated laser's power follows its temperature before the frame: `temperature_k` is that
+        # after it, so the one of the frame before counts.
         before_k = torch.tensor(played.temperature_k[[row], frame - 1]) if frame else drive.start_k
         power_w = emitted_power_w(drive.laser_power_w, before_k, problem.config.laser)
         made = acquire_depth(problem, drive, step, Shots(int(played.shots[row, frame])), power_w)
@@ -68,5 +69,5 @@ def runs_to_show(played: PlayedDrives) -> Iterator[tuple[int, int]]:
 
 
 def _half(image: Tensor) -> np.ndarray:
-    """float16 keeps better than 1 % of a metre where it is scored, at half the size."""
+    """A map of metres as float16: steps of at most 16 mm up to 32 m, at half the size."""
     return image.to(torch.float16).numpy()

@@ -12,8 +12,8 @@ from shotenv.env import ShotScheduleVectorEnv
 from unwrap.signal import Shots
 
 LOWEST: Final = -0.25
-"""Floor of a training reward. A frame without laser costs some ten times what choices differ by;
-at a few times that a trip deters as surely and does not drown the rest of its batch."""
+"""Floor of a training reward (assumed). A frame without laser costs some ten times what choices
+differ by; at a few times that a trip deters as surely and does not drown the rest of its batch."""
 
 
 class PairedVecEnv(Sb3VecEnv):
@@ -47,7 +47,8 @@ class PairedVecEnv(Sb3VecEnv):
 
     def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Step all environments with the kept actions."""
-        # Before the step, which goes on to the next frame.
+        # Before the step, which goes on to the next frame. In rewards the error counts negative:
+        # adding that of 4 DCS leaves what the chosen shots do better or worse.
         usual = self._native.problem.config.reward.error * self._native.error_of(Shots.FOUR)
         observations, rewards, dones, infos = super().step_wait()
         self._observed = observations

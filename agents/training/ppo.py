@@ -30,6 +30,7 @@ from agents.policies import PpoPolicy, ThermalGuard, first_line, network_argumen
 from agents.training.sb3_vector import Sb3VecEnv
 from unwrap.support import progress, write_bytes
 
+# One file, replaced whole: network, optimiser and progress of the same round, or none of them.
 CHECKPOINT: Final = "checkpoint.safetensors"
 SCHEMA: Final = "1"
 Validate = Callable[[PpoPolicy], float]
@@ -100,6 +101,7 @@ class Trainer:
         self._ppo = PPO(
             "MlpPolicy",
             envs,
+            # stable-baselines3 would let it fall within each `learn`, thus within each round.
             learning_rate=lambda remaining: self._learning_rate,
             n_steps=config.rollout_steps,
             batch_size=config.batch_size,
@@ -109,7 +111,7 @@ class Trainer:
             ent_coef=config.entropy_coefficient,
             policy_kwargs=network_arguments(config),
             seed=config.seed,
-            device="cpu",
+            device="cpu",  # two small layers: copying to a GPU would take longer
         )
         self.policy = PpoPolicy(self._ppo.policy, config, guard)
         # What a checkpoint must have been made with to be continued here.
@@ -143,18 +145,21 @@ class Trainer:
                 # an uninterrupted one does.
                 generator = np.random.default_rng((config.seed, state.rounds))
                 set_random_seed(int(generator.integers(2**31)))
+                # No drive twice in a round, unless there are fewer drives than environments.
                 few = config.drives < config.num_envs
                 self._envs.seed_all(generator.choice(drives, config.num_envs, replace=few).tolist())
-                # It falls linearly, round by round, to a tenth.
+                # It falls linearly, round by round, to a tenth (assumed).
                 self._learning_rate = config.learning_rate * (
                     1.0 - 0.9 * state.rounds / self._rounds
                 )
                 # `learn` counts its steps from 0, and therefore resets the environments first:
-                # network and optimiser are all that it keeps from the round before.
+                # network and optimiser are all that it keeps from the round before. The drives
+                # that `seed_all` chose begin there.
                 self._ppo.learn(self._round_steps, callback=_Ticks(bar))
                 state = replace(self._judged(state), rounds=state.rounds + 1)
                 bar.set_postfix_str(f"validation return {state.best_return:.1f}", refresh=False)
                 self._save(state)
+        # From disk: the best round's policy, which need not be the last one's.
         return PpoPolicy.load(self._out)
 
     def _judged(self, state: TrainingState) -> TrainingState:
@@ -178,6 +183,7 @@ class Trainer:
                 words = dict(file.metadata() or {})
                 tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
             same = (words["schema"], words["identity"]) == (SCHEMA, self._identity)
+            # Tensors of another configuration may not fit, which would read as damage.
             if same:
                 _restore(self._ppo, tensors)
             state = TrainingState(**json.loads(words["progress"]))
@@ -213,6 +219,7 @@ def _tensors(ppo: PPO) -> dict[str, torch.Tensor]:
     """Network and optimiser as named tensors: a file of them needs no unpickling to be read."""
     network = {f"network.{name}": value for name, value in ppo.policy.state_dict().items()}
     adam = {
+        # Adam's step count is a plain number in some versions of torch.
         f"optimizer.{parameter}.{name}": torch.as_tensor(value)
         for parameter, slots in ppo.policy.optimizer.state_dict()["state"].items()
         for name, value in slots.items()
@@ -232,5 +239,6 @@ def _restore(ppo: PPO, tensors: dict[str, torch.Tensor]) -> None:
             parameter, slot = rest.split(".", 1)
             slots.setdefault(int(parameter), {})[slot] = value
     ppo.policy.load_state_dict(network)
+    # Names and order of the parameters are the network's; only what Adam remembers is restored.
     optimizer = ppo.policy.optimizer
     optimizer.load_state_dict({**optimizer.state_dict(), "state": slots})

@@ -29,6 +29,8 @@ class Sb3VecEnv(VecEnv):
     """
 
     def __init__(self, envs: VectorEnv) -> None:
+        # Under `NextStep` an ended drive takes one more step, whose action is ignored: a learner
+        # would learn from it.
         mode = envs.metadata.get("autoreset_mode")
         if mode != AutoresetMode.SAME_STEP:
             raise ValueError(f"autoreset_mode is {mode}; stable-baselines3 needs SameStep")
@@ -71,6 +73,7 @@ class Sb3VecEnv(VecEnv):
                 "terminal_observation": infos["final_obs"][i],
                 "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
             }
+        # float32, as stable-baselines3's own environments return them.
         return observations, rewards.astype(np.float32), dones, each
 
     def close(self) -> None:
@@ -79,6 +82,7 @@ class Sb3VecEnv(VecEnv):
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """An attribute of the batch, once per chosen environment."""
+        # stable-baselines3 asks so for `render_mode` when it is built.
         return [getattr(self.envs, attr_name) for _ in self._chosen(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
@@ -117,6 +121,7 @@ def split_infos(infos: dict[str, Any], count: int) -> list[dict[str, Any]]:
         if key.startswith("_"):
             continue
         held = infos.get(f"_{key}")
+        # Without a mask, as of an environment that is batched itself, all have the value.
         holders = range(count) if held is None else np.flatnonzero(held)
         parts = split_infos(values, count) if isinstance(values, dict) else values
         for i in holders:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from stable_baselines3.common.policies import ActorCriticPolicy
 
 VALIDATION_DRIVES: Final = 6
-"""Most drives that choose the best round: they are played again after each."""
+"""Most drives that choose the best round (assumed): they are played again after each."""
 
 
 def train_scheduler(config: DemoConfig, out: Path) -> PpoPolicy:
@@ -28,6 +28,7 @@ def train_scheduler(config: DemoConfig, out: Path) -> PpoPolicy:
     guard = thermal_guard(config)
     envs = make_envs(config.env, "train", config.agent.num_envs, "SameStep")
     seeds = drive_seeds(config.study, min(VALIDATION_DRIVES, config.study.tuning_drives))
+    # Other clips than those of training, and than those of the test that the report tells of.
     judges = make_envs(config.env, "validation", len(seeds), "Disabled")
 
     def validate(policy: PpoPolicy) -> float:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from shotenv.env import ShotScheduleVectorEnv
 
+# The numbers of this file are assumed.
 ROLLOUTS: Final = 3
 """Times that the drives are played with random actions, for the observations they lead to."""
 PASSES: Final = 20
@@ -52,6 +53,7 @@ class KnownFrames:
     @property
     def advantage(self) -> Tensor:
         """Cost of each action beside the mean of the frame's, of unit spread, [N, A]."""
+        # A frame's own difficulty is the same for all actions: nothing can be learnt from it.
         apart = self.cost - self.cost.mean(dim=1, keepdim=True)
         return apart / apart.std().clamp(min=1e-12)
 
@@ -109,6 +111,7 @@ def warm_start(network: ActorCriticPolicy, known: KnownFrames, *, seed: int) -> 
     optimizer = torch.optim.AdamW(network.parameters(), RATE, weight_decay=WEIGHT_DECAY)
     advantage, count = known.advantage, len(known.cost)
     batches = -(-count // BATCH)
+    # The rate falls along a cosine to 0 over all steps.
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, PASSES * batches)
     network.set_training_mode(True)
     # No loss touches the critic: its gradients stay None, and AdamW leaves such parameters alone.

@@ -38,7 +38,7 @@ def wiggle() -> Made:
     true_rad = torch.linspace(0, TWO_PI, 2001, dtype=torch.float64)[:-1]
     along = true_rad.numpy() * PER_RADIAN_M
     shipped = harmonic_weights(SENSOR.harmonic_strength, SENSOR.highest_harmonic)
-    ideal = harmonic_weights(1.0, 501)
+    ideal = harmonic_weights(1.0, 501)  # so many that their sum is a triangle to 0.1 %
     for name, weights, colour in (
         ("sine", harmonic_weights(0.0, 1), GREEN),
         (f"strength {SENSOR.harmonic_strength:g}", shipped, BLUE),
@@ -133,7 +133,8 @@ def _wrong_share(sigma_m: float) -> float:
     found_m, _ = unwrap_dual(
         first, second, SENSOR.f1_hz, SENSOR.f2_hz, max_range_m=SENSOR.max_range_m
     )
-    # A right wrap moves by the share of the noise that fusing lets through.
+    # The distances of both frequencies are averaged, weighted by f1^2 and f2^2, their inverse
+    # variances: a right wrap moves by the share of the noise that this lets through.
     share2 = SENSOR.f2_hz**2 / (SENSOR.f1_hz**2 + SENSOR.f2_hz**2)
     apart_m = found_m - TRUE_M
     wraps = torch.round((apart_m - share2 * noise_m) / unambiguous_range_m(SENSOR.f1_hz))

@@ -22,6 +22,7 @@ from figures.stage import (
     Made,
     Row,
     acquired,
+    apart_m,
     axes,
     floor,
     label,
@@ -45,12 +46,6 @@ def _wrapped_m(correlation: np.ndarray) -> np.ndarray:
     return distance_m(decode(torch.from_numpy(correlation)).phase_rad, SENSOR.f1_hz).numpy()
 
 
-def _apart_m(measured_m, true_m):
-    """Difference of two distances, wrapped to half an unambiguous range."""
-    range_m = unambiguous_range_m(SENSOR.f1_hz)
-    return np.remainder(measured_m - true_m + range_m / 2, range_m) - range_m / 2
-
-
 def signal() -> Made:
     """Amplitude of a rendered wall over its distance."""
     figure, (panel,) = axes("A wall straight ahead: 7 W, 600 µs")
@@ -64,6 +59,7 @@ def signal() -> Made:
             maps = (frame.correlation, frame.active, frame.ambient, frame.distance_m)
             exposure = Exposure(*(torch.from_numpy(values)[None] for values in maps))
             raw = acquired(exposure)
+            # A full well cuts the amplitude off: of near bright walls there is no point to draw.
             if not raw.saturated[0][MIDDLE]:
                 found[albedo, distance] = float(decode(raw.dcs_lsb).amplitude[0][MIDDLE])
         mine = [(d, a) for (one, d), a in found.items() if one == albedo]
@@ -92,7 +88,7 @@ def multipath() -> Made:
     camera = CAMERA.model_copy(
         update={"width": 48, "height": 36, "samples_per_pixel": 256, "bounces": 4}
     )
-    half = 2.5 / math.sqrt(2)
+    half = 2.5 / math.sqrt(2)  # two sides of 5 m at right angles, turned by 45 degrees
     figure, panels = axes(
         "Error, albedo 0.8, 3 further bounces", "Mean of the middle rows", widths=(1, 1.1)
     )
@@ -103,7 +99,8 @@ def multipath() -> Made:
             for s in (1, -1)
         ]
         frame = rendered(world(join(sides)), camera)
-        error_mm = 1e3 * _apart_m(_wrapped_m(frame.correlation[:4]), frame.distance_m)
+        measured_m = _wrapped_m(frame.correlation[:4])
+        error_mm = 1e3 * apart_m(measured_m, frame.distance_m, unambiguous_range_m(SENSOR.f1_hz))
         middle = slice(camera.height // 2 - 2, camera.height // 2 + 2)
         panels[1].plot(
             columns, error_mm[middle].mean(axis=0), color=colour, label=f"albedo {albedo:g}"
@@ -168,6 +165,7 @@ def motion() -> Made:
     """A wall that comes nearer, and an edge that passes."""
     figure, panels = axes("Wall coming at 6 m/s", "Edge passing at 60 m/s", widths=(1.3, 1))
     speed_m_s, distances = 6.0, np.linspace(7.0, 12.5, 15)
+    # The renderer wants something that stands still; nobody sees it.
     buried = plate((0, 0, -50), (1, 0, 0), (0, 1, 0))
     worst_m = 0.0
     found = {2: [], 4: []}
@@ -176,7 +174,7 @@ def motion() -> Made:
         frame = rendered(world(buried, coming))
         for count, errors in found.items():
             measured = _wrapped_m(frame.correlation[:count])[MIDDLE]
-            errors.append(float(_apart_m(measured, distance)))
+            errors.append(float(apart_m(measured, distance, unambiguous_range_m(SENSOR.f1_hz))))
     fine = np.linspace(7.0, 12.5, 300)
     for count, colour in ((4, BLUE), (2, RED)):
         panels[0].plot(fine, 1e3 * motion_error_m(fine, speed_m_s, count), color=colour, lw=1)
@@ -239,8 +237,9 @@ def samples() -> Made:
         range_m = unambiguous_range_m(hz)
         panels[1].plot(true_m[0], wrapped, ".", ms=1.5, color=colour, label=f"{hz / 1e6:g} MHz")
         panels[1].axhline(range_m, color=colour, ls=":", lw=0.8)
-        error = np.remainder(wrapped - true_m[0].numpy() + range_m / 2, range_m) - range_m / 2
+        error = apart_m(wrapped, true_m[0].numpy(), range_m)
         amplitude = float(frame.amplitude.mean())
+        # Each of two quadratures is rounded to half an LSB at most, as a mean of two samples.
         bound_m = range_m / TWO_PI * math.sqrt(0.5) / float(frame.amplitude.min())
         errors.append(
             Row(

@@ -21,6 +21,7 @@ from figures.stage import (
     acquired,
     active_of,
     ambient_of,
+    apart_m,
     axes,
     label,
     light_of,
@@ -49,12 +50,14 @@ from unwrap.signal.wiggle import shifted
 def photon_transfer() -> Made:
     """Variance over mean of one sample, from dark to bright."""
     figure, (panel,) = axes("Photon transfer: 100 000 pixels at each level")
+    # Fine steps and no full well: rounding and clipping would add to and take from the variance.
     fine = merged(SINE, {"gain_lsb_per_e": 0.1, "adc_bits": 16, "full_well_e": 1e7})
     gain, shape, means, variances = fine.gain_lsb_per_e, (250, 400), [], []
     for level, signal_e in enumerate(np.geomspace(300, 1e5, 12)):
         still = light_of(fine, torch.zeros(shape), torch.full(shape, active_of(signal_e)))
         noise = draw_noise(21, level, 4, *shape)[None]
         dcs = acquired(still, fine, noise=noise).dcs_lsb.double()
+        # At distance 0 the opposite sample is -D0: both tell its mean.
         means.append(float((dcs[:, 0] - dcs[:, 2]).mean() / 2))
         variances.append(float(dcs.var(dim=(2, 3)).mean()))
     mean, variance = np.array(means), np.array(variances)
@@ -198,8 +201,7 @@ def _offset_rms_m(shots: Shots, pattern, known, amplitude_lsb: float) -> float:
     still = light_of(quiet, true_m, torch.full((120, 160), active))
     raw = acquired(still, quiet, shots, offsets=pattern)
     measured_m = distance_m(decode(raw.dcs_lsb, offset_lsb=known).phase_rad, quiet.f1_hz)
-    error_m = torch.remainder(measured_m - true_m + range_m / 2, range_m) - range_m / 2
-    return float(error_m.square().mean().sqrt())
+    return float(apart_m(measured_m, true_m, range_m).square().mean().sqrt())
 
 
 def temperature() -> Made:
@@ -267,6 +269,7 @@ def gray() -> Made:
         exposures.append(float(exposure_s))
         ratios.append(float(words.double().mean() / words.double().std()))
         charge_e = rate * level * exposures[-1]
+        # A rounded word errs evenly within one step, whose variance is 1 / 12.
         rounding_e2 = 1 / 12 / gray_gain_lsb_per_e(SENSOR) ** 2
         expected.append(charge_e / math.sqrt(charge_e + SENSOR.read_noise_e**2 + rounding_e2))
     wanted = SENSOR.gray_target * SENSOR.full_well_e / (rate * levels)

@@ -32,7 +32,7 @@ SENSOR = read_config(SensorConfig, find_config("sensor", "epc660"))
 LASER = read_config(LaserConfig, find_config("laser", "vcsel_detailed"))
 SINE = SENSOR.model_copy(update={"harmonic_strength": 0.0})
 """The sensor with sines for light and demodulation."""
-POWER_W, INTEGRATION_S, ALBEDO = 7.0, 6e-4, 0.4
+POWER_W, INTEGRATION_S, ALBEDO = 7.0, 6e-4, 0.4  # assumed: ordinary ones of the drives
 CAMERA = CameraConfig(width=17, height=17, samples_per_pixel=1, gray_instants=1, bounces=1)
 MIDDLE = (8, 8)
 PER_RADIAN_M = unambiguous_range_m(SENSOR.f1_hz) / TWO_PI
@@ -56,7 +56,7 @@ def axes(*titles: str, widths: tuple[float, ...] | None = None) -> tuple[Figure,
     figure = Figure(figsize=(7.2, 3.0), layout="constrained")
     ratios = widths or (1.0,) * len(titles)
     panels = figure.subplots(1, len(titles), width_ratios=ratios, squeeze=False)[0]
-    figure.get_layout_engine().set(w_pad=0.08)
+    figure.get_layout_engine().set(w_pad=0.08)  # else labels touch the next panel
     for panel, title in zip(panels, titles, strict=True):
         panel.set_title(title)
     return figure, list(panels)
@@ -87,6 +87,7 @@ def light_of(
     weights = harmonic_weights(sensor.harmonic_strength, sensor.highest_harmonic)
     samples = []
     for k in range(8):
+        # Double: at 25 m the phase is 25 rad, which float32 knows to 2e-6 only.
         phase = phase_of(distance_m.double(), frequencies[frequency_index(k)])
         angle = phase - demodulation_phase_rad(k)
         samples.append(active * sum(weight * torch.cos(h * angle) for h, weight in weights))
@@ -177,9 +178,15 @@ def rays(camera: CameraConfig = CAMERA) -> np.ndarray:
 
 @cache
 def _solid_angle_sr(camera: CameraConfig) -> float:
+    # Closed form of a rectangle seen from above its middle, half sides 1 away.
     across = math.tan(math.radians(camera.horizontal_fov_deg / 2))
     down = across * camera.height / camera.width
     return 4 * math.asin(across / math.hypot(1, across) * down / math.hypot(1, down))
+
+
+def apart_m(measured_m, true_m, range_m: float):
+    """Difference of two distances, wrapped to half an unambiguous range on either side of 0."""
+    return (measured_m - true_m + range_m / 2) % range_m - range_m / 2
 
 
 def wall_return(distance_m, albedo: float = ALBEDO, camera: CameraConfig = CAMERA):

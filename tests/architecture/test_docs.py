@@ -61,6 +61,7 @@ def links(page: str) -> set[str]:
 
 def spoken(page: str) -> list[str]:
     """What a page has in backticks within its sentences and tables."""
+    # Blocks of code are read by `blocks`: they hold backticks, and words that are no names.
     prose = re.sub(r"^```.*?^```", "", PAGES[page], flags=re.MULTILINE | re.DOTALL)
     return [" ".join(words.split()) for words in re.findall(r"`([^`]+)`", prose)]
 
@@ -75,6 +76,7 @@ def found(dotted: str) -> bool:
     module, _, names = dotted.partition(".")
     thing = importlib.import_module(module)
     for name in names.split(".") if names else ():
+        # A room has what its door names, and its files, which are there only once imported.
         try:
             thing = getattr(thing, name)
         except AttributeError:
@@ -176,6 +178,7 @@ def test_the_map_names_files_that_have_what_it_says(new):
     said = "\n".join(file.read_text("utf-8") for file in files if file.suffix in (".py", ".pyi"))
     names = [word for word in words if re.fullmatch(r"\w+", word) and not (ROOT / word).exists()]
     assert places
+    # `def name`, `class name`, `name = ...`, `name: Type = ...`, and the field `name: Type`.
     defined = r"^\s*(?:(?:def|class) {0}\b|{0}(?:: [^=\n]+)? = |{0}: )"
     assert [n for n in names if not re.search(defined.format(n), said, re.MULTILINE)] == []
 

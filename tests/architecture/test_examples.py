@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import doctest
+import importlib
 import math
 import re
 from pathlib import Path
@@ -17,6 +19,12 @@ README = re.findall(
     r"^```python\n(.*?)^```", (ROOT / "README.md").read_text("utf-8"), re.MULTILINE | re.DOTALL
 )
 F1_HZ = 24e6
+WITH_EXAMPLES = sorted(
+    path.relative_to(ROOT).with_suffix("").as_posix().replace("/", ".")
+    for house in ("unwrap", "shotenv", "agents")
+    for path in (ROOT / house).rglob("*.py")
+    if ">>> " in path.read_text("utf-8")
+)
 
 
 @pytest.fixture
@@ -49,6 +57,13 @@ def test_the_quickstart_runs(small_env, capsys):
     *rows, last = capsys.readouterr().out.splitlines()
     assert len(rows) == 3
     assert re.fullmatch(r"return -\d+\.\d", last)
+
+
+@pytest.mark.parametrize("name", WITH_EXAMPLES)
+def test_examples_in_docstrings_print_what_they_say(name):
+    # `...` stands for what differs from version to version, such as the rest of an error's message.
+    tried = doctest.testmod(importlib.import_module(name), optionflags=doctest.ELLIPSIS)
+    assert tried.failed == 0
 
 
 @pytest.mark.parametrize("samples", [2, 4])

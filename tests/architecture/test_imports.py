@@ -134,6 +134,7 @@ def test_imports_stay_within_the_table_and_go_through_doors(source):
     for module, name in imports_of(source):
         package = module.partition(".")[0]
         if package in ("unwrap", "shotenv", "agents"):
+            # `agents.cli.entry` is a file inside a room, `agents.cli` the door of one.
             inside = module in MODULES and module not in ROOMS
             target = module.rpartition(".")[0] if inside else module
             if target == own:
@@ -144,25 +145,49 @@ def test_imports_stay_within_the_table_and_go_through_doors(source):
             assert source.startswith(ONLY_IN[package]), f"{source} imports {module}"
 
 
-def test_no_module_imports_itself_round_corners():
-    """No cycles between files, where imports inside functions do not count."""
-    graph = {}
-    for source in SOURCES:
-        body = ast.parse((ROOT / source).read_text(encoding="utf-8")).body
-        graph[source] = {
-            node.module.replace(".", "/") + ".py"
-            for node in body
-            if isinstance(node, ast.ImportFrom)
-        }
-    reached = {source: {source} for source in SOURCES}
-    for source in SOURCES:
-        waiting = list(graph[source])
+def files_imported(text: str) -> set[str]:
+    """Files that a source imports as it is loaded: `from agents.cli import entry` may be one, too.
+
+    Imports inside functions and for type checkers alone do not count.
+    """
+    return {
+        module.replace(".", "/") + ".py"
+        for node in ast.parse(text).body
+        if isinstance(node, ast.ImportFrom) and node.module
+        for module in (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
+    }
+
+
+def in_cycles(graph: dict[str, set[str]]) -> list[str]:
+    """Files that import themselves in the end."""
+    found = []
+    for source in graph:
+        waiting, reached = list(graph[source]), set()
         while waiting:
             following = waiting.pop()
-            assert following != source, f"{source} imports itself in the end"
-            if following in graph and following not in reached[source]:
-                reached[source].add(following)
+            if following in graph and following not in reached:
+                reached.add(following)
                 waiting += graph[following]
+        if source in reached:
+            found.append(source)
+    return found
+
+
+def test_no_module_imports_itself_round_corners():
+    """Between files of a room; the table, in which rooms import those above, has no cycles."""
+    texts = {source: (ROOT / source).read_text(encoding="utf-8") for source in SOURCES}
+    assert in_cycles({source: files_imported(text) for source, text in texts.items()}) == []
+
+
+def test_cycles_are_found_however_they_are_written():
+    made = {
+        "room/one.py": "from room import two",
+        "room/two.py": "import os\nfrom room.three import thing",
+        "room/three.py": "from room.one import other",
+        "room/four.py": "from room.one import other\ndef f():\n    from room.four import f",
+    }
+    graph = {source: files_imported(text) for source, text in made.items()}
+    assert in_cycles(graph) == ["room/one.py", "room/two.py", "room/three.py"]
 
 
 def test_every_room_is_in_the_table_and_says_what_it_is_for():
@@ -171,6 +196,7 @@ def test_every_room_is_in_the_table_and_says_what_it_is_for():
         door = ROOT / name.replace(".", "/") / "__init__.py"
         words = ast.get_docstring(ast.parse(door.read_text(encoding="utf-8")))
         assert words and words.splitlines()[0].endswith("."), f"{name} does not say what it is for"
+        # The peers are loaded by name from the registry's table: nobody else may use them.
         assert door.with_suffix(".pyi").is_file() or name == "unwrap.networks.peers"
 
 
@@ -221,6 +247,7 @@ def test_no_name_stands_for_two_files():
     ],
 )
 def test_import_is_light(package, heavy):
+    # In a process of its own: here everything has long been loaded.
     code = f"import sys, {package}; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -25,7 +25,7 @@ MAY_BE_SKIPPED: Mapping[str, str] = {
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, Any]:
     """Turn the skip of a test into a failure."""
     report = yield
-    name = getattr(item, "originalname", item.name)
+    name = getattr(item, "originalname", item.name)  # without the parameters in brackets
     return report if name in MAY_BE_SKIPPED else _no_skip(report)
 
 

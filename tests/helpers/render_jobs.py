@@ -29,6 +29,7 @@ def killed_at_three(number: int) -> int:
 
 def stopped_at_three(number: int) -> int:
     if number == 3:
+        # A worker that hangs: it neither answers nor ends.
         os.kill(os.getpid(), signal.SIGSTOP)
     return number
 

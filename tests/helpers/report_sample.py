@@ -30,6 +30,7 @@ def made_up_results(difference=(6.0, 2.0, 9.0), f1_hz=24e6, split="test"):
             "tripped_share": made_up_interval(0.01 * shots, 0.005),
             "shots_share": shares[name],
         }
+    # The rules that say what they do have one; that it has a "<" tells whether the page escapes it.
     policies["snr_threshold"]["rule"] = "8 DCS where signal_to_noise < -0.30, else 2"
     pair = dict(zip(("difference", "low", "high"), difference, strict=True))
     zero = {"difference": 0.0, "low": 0.0, "high": 0.0}

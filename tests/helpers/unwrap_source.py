@@ -41,6 +41,7 @@ class Walls:
         self, numbers: Sequence[int], *, draw: int, shots: Shots | None
     ) -> tuple[Sensed, Truth]:
         distance_m = self.distance_m[list(numbers)]
+        # Of draw and frames alone: whoever asks for the same batch again gets the same noise.
         generator = torch.Generator().manual_seed(1000 * draw + sum(numbers))
         noise = torch.randn(len(numbers), 9, HEIGHT, WIDTH, generator=generator)
         gray = 1 / (1 + distance_m.clamp(max=40) / 3) + 0.01 * noise[:, 8]

@@ -56,5 +56,6 @@ def test_guarded_always_8_never_trips_where_always_8_does(tiny_kwargs, laser):
         envs = ShotScheduleVectorEnv(6, autoreset_mode="Disabled", remember=True, **kwargs)
         return (play_drives(policy, envs, seeds).shots == 0).sum(axis=1)
 
+    # Else the drives prove nothing about the guard.
     assert (tripped(FixedPolicy(8)) > 0).any()
     assert (tripped(GuardedPolicy(FixedPolicy(8), guard)) == 0).all()

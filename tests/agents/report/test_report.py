@@ -68,6 +68,7 @@ def test_strongest_rival_is_named_with_its_interval():
 def test_page_is_self_contained(page):
     without_plotly = re.sub(r"<script>.*?</script>", "", page, count=1, flags=re.DOTALL)
     assert not re.search(r"(src|href)\s*=\s*[\"'](https?:)?//", without_plotly)
+    # The first script is plotly itself, the others the charts and the page's own.
     library, *calls = re.findall(r"<script[^>]*>(.*?)</script>", page, flags=re.DOTALL)
     assert len(library) > 10**6 and "plotly.js" in library[:200]
     assert sum("Plotly.newPlot" in call for call in calls) == 3

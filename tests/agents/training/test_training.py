@@ -139,6 +139,7 @@ def test_interrupted_training_equals_uninterrupted(tmp_path):
             raise KeyboardInterrupt
         return validate(policy)
 
+    # In the third validation: after a round that no checkpoint holds yet.
     with pytest.raises(KeyboardInterrupt):
         make_trainer(tmp_path / "parts", check=interrupted).run()
     resumed = make_trainer(tmp_path / "parts").run()
@@ -154,6 +155,7 @@ def test_checkpoints_of_other_runs_and_damaged_ones_are_refused(tmp_path):
     other = CONFIG.model_copy(update={"gamma": 0.5})
     with pytest.raises(ValueError, match="another configuration"):
         make_trainer(tmp_path, config=other).run()
+    # What a pickle begins with: nothing may try to read it as one.
     (tmp_path / CHECKPOINT).write_bytes(b"\x80\x04.")
     with pytest.raises(ValueError, match=r"checkpoint\.safetensors is damaged"):
         make_trainer(tmp_path).run()
