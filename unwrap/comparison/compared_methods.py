@@ -27,9 +27,10 @@ from unwrap.training import acquiring_threads, in_order, loader
 
 FEW = (Shots.TWO, Shots.FOUR)
 PROBABILITIES: tuple[NetworkName, ...] = ("tofsegnet", "toffusionnet", "phasenet", "chen_net")
-"""Networks whose confidence is the probability that the wrap is right."""
+"""Networks whose confidence is the probability that the wrap is right; that of the others measures
+how far a distance is from a boundary or from the measured phase."""
 CALIBRATION_DRAW = 1
-"""Draw of the training frames that the reflectance prior is measured on."""
+"""Draw of the training frames that the reflectance prior is measured on, that of epoch 1."""
 CALIBRATION_BATCH = 16
 CPU = torch.device("cpu")
 

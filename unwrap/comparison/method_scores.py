@@ -59,6 +59,7 @@ def score_methods(
         for shots in Shots
         if shots in method.shots
     }
+    # Samples in the outer loop: each batch is acquired once for all methods that take as many.
     for shots in dict.fromkeys(shots for _, shots in tallies):
         of_shots = [tally for (_, its), tally in tallies.items() if its == shots]
         orders = in_order(frames, SCORED_AT_ONCE[device.type], (shots,), draw=JUDGED_DRAW)

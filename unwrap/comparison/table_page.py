@@ -91,6 +91,7 @@ def tables(rows: Sequence[Row]) -> str:
 def _table(rows: Iterable[Row]) -> str:
     heads = ("DCS", "method", "merge", *(head for _, head, _ in COLUMNS))
     lines = [heads, ["---"] * len(heads)]
+    # A stable sort: with as many samples, methods stay in the order in which they were planned.
     for row in sorted(rows, key=lambda row: row["shots"]):
         numbers = [format(row[key], form) if key in row else "" for key, _, form in COLUMNS]
         lines.append([str(row["shots"]), row["method"], row["merge"], *numbers])

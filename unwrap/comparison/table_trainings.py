@@ -89,7 +89,7 @@ def _training(
 ) -> Training:
     shared = ("bank", "sensor", "stride", "width", "epochs", "batch_size", "learning_rate", "seed")
     values = {name: getattr(config, name) for name in shared} | RECIPES[recipe] | fields
-    # The only network that was made to look at its own depth of the frame before.
+    # Memory: for the only network that was made to look at its own depth of the frame before.
     memory = network == "toffusionnet"
     ours = " with our loss" if network in PAPERS and recipe == "ours" else ""
     train_config = TrainConfig(network=network, memory=memory, **values)
@@ -118,5 +118,6 @@ def _is_trained(path: Path, config: TrainConfig) -> bool:
     numbers = path.with_suffix(".json")
     if not (path.is_file() and numbers.is_file()):
         return False
+    # Where the configuration is another, `train` goes on to refuse the checkpoint beside it.
     trained_as = json.loads(numbers.read_text(encoding="utf-8"))["config"]
     return trained_as == config.model_dump(mode="json")

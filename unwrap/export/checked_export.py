@@ -38,6 +38,7 @@ class CheckedExport:
     def __init__(self, network: Exported, frames: ExportFrames, metadata: Mapping[str, str]):
         self._frames = frames
         self._content = to_onnx(network, frames.one_by_one()[0], metadata)
+        # Torch computes once what both files are held against.
         self._judge = Judge(frames, network.sensor.f1_hz, torch_outputs(network, frames))
 
     def write(self, path: Path) -> dict[str, Any]:
@@ -113,6 +114,7 @@ def metadata_of(
     }
     if shots is not None:
         values |= {"shots": int(shots), "min_snr": sensor.min_snr}
+    # The metadata of an ONNX file is text alone.
     return {name: str(value) for name, value in values.items()}
 
 

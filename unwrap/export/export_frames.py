@@ -58,6 +58,7 @@ class ExportFrames:
 
     def one_by_one(self) -> list[dict[str, Tensor]]:
         """What the file takes for each frame."""
+        # Slices of one, not elements: the file's inputs keep their first axis.
         frames = zip(*(values.split(1) for values in self.inputs.values()), strict=True)
         return [dict(zip(self.inputs, frame, strict=True)) for frame in frames]
 

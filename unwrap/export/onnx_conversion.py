@@ -114,6 +114,8 @@ def onnx_outputs(content: bytes, frames: ExportFrames) -> dict[str, Tensor]:
     """Outputs [N, H, W] of the ONNX file `content` by name, by onnxruntime on the CPU."""
     import onnxruntime
 
+    # One frame at a time, as the file takes them, and always on the processor, so that what a check
+    # finds does not depend on what else is installed.
     session = onnxruntime.InferenceSession(content, providers=["CPUExecutionProvider"])
     names = [output.name for output in session.get_outputs()]
     outputs = [session.run(names, _arrays(inputs)) for inputs in frames.one_by_one()]

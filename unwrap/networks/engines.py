@@ -31,6 +31,7 @@ class Engine:
 
     def __init__(self, network: Network, device: torch.device):
         self._network, self._device = network, device
+        # Now, since whoever calls may have turned torch down to one thread for what is around it.
         self._threads = torch.get_num_threads()
         self._forwards: dict[torch.Size, Callable[[Tensor], Tensor]] = {}
 

@@ -103,6 +103,7 @@ def ssim_loss(prediction: Tensor, truth: Tensor, data_range: float = 1.0) -> Ten
 def _windows(length: int, like: Tensor) -> Tensor:
     """The window at each of its places along an axis, one place a row: [length - 10, length]."""
     distances = torch.arange(length) - torch.arange(5, length - 5)[:, None]
+    # Cut off at five pixels either way and normalised, as in the paper's reference.
     window = torch.exp(-(distances**2) / (2 * 1.5**2)) * (distances.abs() <= 5)
     return (window / window.sum(1, keepdim=True)).to(like)
 

@@ -76,5 +76,7 @@ class CompiledNetwork:
     def __call__(self, features: Tensor) -> Tensor:
         """What the network computes, float32."""
         with self._free:
+            # The features are read where they lie; the output is a copy, which the next call leaves
+            # alone.
             (output,) = self._request.infer([features.numpy()], share_inputs=True).values()
         return torch.from_numpy(output)

@@ -102,6 +102,7 @@ class Unwrapper:
         if self.network.needs == "samples" and sensed.raw is None:
             raise ValueError(f"raw is None; {self.name} needs the samples of each frame")
         self.require_frequency(sensor)
+        # The device follows the network: who wants another moves the network there.
         device = next(self.network.parameters()).device
         engine, count = self.engines.on(device), FRAMES_AT_ONCE[device.type]
         stride = self.stride(*sensed.gray.shape[-2:])

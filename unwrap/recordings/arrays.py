@@ -19,7 +19,8 @@ _BROKEN = (
     *(OSError, ValueError, KeyError, EOFError, NotImplementedError, RuntimeError),
     *(zipfile.BadZipFile, zlib.error),
 )
-"""What reading damaged files raises."""
+"""What reading damaged files raises: RuntimeError also where an archive is encrypted,
+NotImplementedError where its compression is unknown."""
 
 
 def read_arrays(path: Path, alone: str, known: Collection[str]) -> dict[str, np.ndarray]:

@@ -29,6 +29,7 @@ def refuse_overwriting(recording: Recording, out: Path) -> None:
     ValueError
         One stands already; the message names it.
     """
+    # All frames at once: half a recording written would be worse than none.
     for path in (out / name / file for name in recording.names for file in OUTPUT_FILES):
         if path.exists():
             raise ValueError(f"{path} stands already; --overwrite replaces it")
@@ -55,6 +56,7 @@ def write_frames(
     """
     numbers = []
     for frame in frames:
+        # The frame of a recording without an axis of frames is named "": it lies in `out` itself.
         folder = out / frame.recording.names[0]
         for name, content in encode_frame(frame, camera).items():
             write_bytes(folder / name, content)
@@ -105,6 +107,7 @@ def point_cloud(frame: CorrectedFrame, horizontal_fov_deg: float) -> bytes:
     points = points_of(frame.depth.distance_m.double(), focal)[:, 0, valid].T
     colors = None
     if frame.recording.gray is not None:
+        # Four channels, the last opaque: trimesh colours have no other form.
         level = (frame.recording.gray[0][valid] * 255).round().byte().numpy()
         colors = np.stack([level, level, level, np.full_like(level, 255)], axis=-1)
     return trimesh.PointCloud(points.numpy(), colors=colors).export(file_type="ply")

@@ -47,6 +47,7 @@ def draw_frame(frame: CorrectedFrame, sensor: SensorDescription) -> Image.Image:
     tiles = []
     for name, values, colors in panels:
         tile = enlarged(paint(values, colors), TILE_PX)
+        # Frames that are shown larger than `TILE_PX` get larger words.
         legend = bar(name, colors, tile.width, max(1, tile.width // (2 * TILE_PX)))
         tiles.append(column([tile, legend]))
     words = f"{int(frame.recording.raw.shots)} DCS   {100 * valid.mean():.1f} % valid"

@@ -51,6 +51,8 @@ def correct_recording(recording: Recording, camera: Camera) -> list[CorrectedFra
             offset_lsb = None if one.offset_lsb is None else one.offset_lsb.unsqueeze(0)
             sensed = Sensed(one.gray, one.raw, offset_lsb)
             prediction = unwrapper.predict_sensed(sensed, camera.description)
+        # Recordings tell no noise of their own: what counts as strong is measured by the dark noise
+        # of the camera's description.
         depth = correct(
             one.raw,
             None if prediction is None else prediction.distance_m,

@@ -62,6 +62,7 @@ def read_folder(folder: Path, *, bits: int = ADC_BITS) -> Recording:
     """
     if any(folder.glob("dcs_*.png")):
         return recording_of(_read_frame(folder), str(folder), bits=bits)
+    # As text: "10" comes before "9", but not before "09".
     frames = sorted(path for path in folder.iterdir() if any(path.glob("dcs_*.png")))
     if not frames:
         raise ValueError(
@@ -81,6 +82,7 @@ def read_folder(folder: Path, *, bits: int = ADC_BITS) -> Recording:
 
 def _read_frame(folder: Path) -> dict[str, np.ndarray]:
     """`dcs` [n, H, W] and, if there is one, `gray` [H, W] of a folder of images."""
+    # The glob lets dcs_old.png through, which is not a sample.
     numbers = sorted(
         int(found[1])
         for path in folder.glob("dcs_*.png")

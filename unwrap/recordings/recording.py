@@ -160,6 +160,7 @@ def _raw_frame(dcs: np.ndarray, where: str, bits: int) -> RawFrame:
     kind, low, high = dcs.dtype.kind, -mid_scale(bits), mid_scale(bits) - 1
     # Bytes are refused: they would be words cut short, whose wraps look like good samples.
     if kind == "u" and dcs.dtype.itemsize > 1:
+        # high - low is the largest word, 2^bits - 1.
         if dcs.max() > high - low:
             raise ValueError(f"{where}: dcs holds words up to {dcs.max()}; expected {bits} bits")
         return from_words(torch.from_numpy(dcs.astype(np.int32)), bits=bits)

@@ -1,3 +1,5 @@
+"""Methods compared: scores of known methods, memory, the whole table."""
+
 import json
 
 import numpy as np
@@ -72,6 +74,7 @@ def test_frames_looked_at_together_score_as_one_by_one(frames, monkeypatch):
 
     methods = [Method(f"{i}", "none", (Shots.FOUR,), look, remembers=i > 0) for i in range(2)]
     alone = score_methods(methods, frames)
+    # Three: no divisor of the frames of a clip, so that a batch holds the start of the next.
     monkeypatch.setitem(SCORED_AT_ONCE, "cpu", 3)
     assert score_methods(methods, frames) == alone
 

@@ -1,3 +1,5 @@
+"""Two-frequency unwrapping against a slow reference, and its errors in noise."""
+
 import math
 
 import pytest
@@ -66,6 +68,7 @@ def test_recovers_every_distance_of_the_range(max_range_m):
 
 def test_wraps_are_right_while_the_frequencies_differ_by_less_than_half_the_lattice():
     truth = torch.linspace(1.0, 24.0, 2000, dtype=torch.float64)
+    # Candidates within 25 m lie 2.5 m apart: 1.2 m is just below half of that.
     for shift in (-1.2, 1.2):
         distance, residual = unwrap_dual(
             phase_of(truth, F1), phase_of(truth + shift, F2), F1, F2, max_range_m=25.0
@@ -82,6 +85,7 @@ def test_fusion_has_the_smallest_variance():
     distance, _ = unwrap_dual(
         phase_of(truth, F1) + noise[0], phase_of(truth, F2) + noise[1], F1, F2, max_range_m=25.0
     )
+    # Weights 1 / sigma^2 add up: 1 / sigma^2 = (f1^2 + f2^2) / (c noise / 4 pi)^2.
     metres_per_radian = 299_792_458.0 / (4 * math.pi)
     expected = 0.02 * metres_per_radian / math.hypot(F1, F2)
     assert float(distance.std()) == pytest.approx(expected, rel=0.01)

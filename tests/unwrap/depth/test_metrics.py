@@ -1,3 +1,5 @@
+"""Depth metrics by hand, and which pixels and images count."""
+
 import math
 
 import pytest
@@ -30,6 +32,7 @@ def test_two_pixels_by_hand():
     metrics = depth_metrics(truth + torch.tensor([0.05, -2.0]), truth, torch.ones(1, 1, 2) > 0)
     assert metrics["rmse_m"] == pytest.approx(math.sqrt((0.05**2 + 4) / 2))
     assert metrics["within_0p1m"] == metrics["within_0p5m"] == 0.5
+    # Interpolated between the two errors, 0.05 and 2.
     assert metrics["p95_m"] == pytest.approx(0.05 + 0.95 * 1.95)
     logs = math.log(2 / 2.05), math.log(10 / 8)
     assert metrics["silog"] == pytest.approx(100 * abs(logs[0] - logs[1]) / 2, rel=1e-5)

@@ -1,3 +1,5 @@
+"""The body of the networks: sizes, layers, gradients, a heap left in order."""
+
 import os
 import subprocess
 import sys

@@ -1,3 +1,5 @@
+"""Networks made ready to predict compute what they computed before."""
+
 import sys
 
 import pytest

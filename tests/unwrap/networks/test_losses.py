@@ -1,3 +1,5 @@
+"""Losses against closed forms of their values and gradients."""
+
 import pytest
 import torch
 
@@ -22,6 +24,7 @@ def depths():
 def test_scale_invariant_gradient_is_the_closed_form(depths, mean_share):
     prediction, truth = depths
     scale_invariant_loss(prediction, truth, mean_share).backward()
+    # d/dp of mean(d^2) - s mean(d)^2, with d = truth - p.
     error = (prediction - truth).detach()
     mean = error.mean((1, 2), keepdim=True)
     expected = 2 * (error - mean_share * mean) / error.numel()

@@ -1,3 +1,5 @@
+"""Arrays to recordings: what is understood, and what is refused by name."""
+
 import io
 import pickle
 import zipfile

@@ -1,3 +1,5 @@
+"""Samples to phase: the sample model inverted, a slow reference, refusals."""
+
 import math
 
 import pytest
@@ -61,6 +63,7 @@ def test_offset_cancels_in_four_samples_and_is_subtracted_from_two():
     four = samples_of(phase, 100.0, 4)
     torch.testing.assert_close(decode(four + offset).phase_rad, phase, rtol=0, atol=1e-5)
     two = four[:2] + offset
+    # Without the map it is wrong, so that the last line proves something.
     assert (decode(two).phase_rad - phase).abs().max() > 0.1
     torch.testing.assert_close(decode(two, offset_lsb=offset).phase_rad, phase, rtol=0, atol=1e-5)
 
@@ -74,7 +77,7 @@ def test_residual_tells_a_moved_pixel_only_with_four_samples():
 
 
 def test_batch_dimensions_are_kept_and_the_input_is_not_written():
-    dcs = torch.randn(5, 3, 4, 6, 7)
+    dcs = torch.randn(5, 3, 4, 6, 7)  # Two leading axes.
     before = dcs.clone()
     frame = decode(dcs)
     assert frame.phase_rad.shape == frame.amplitude.shape == frame.residual.shape == (5, 3, 6, 7)
@@ -82,6 +85,7 @@ def test_batch_dimensions_are_kept_and_the_input_is_not_written():
 
 
 def test_large_but_finite_samples_pass():
+    # Their sum and their squares overflow to infinity, which must not pass for a bad sample.
     assert decode(torch.full((2, 300, 300), 1e35)).phase_rad.isfinite().all()
 
 

@@ -1,3 +1,5 @@
+"""Batches for training: varied, shuffled, acquired ahead."""
+
 import threading
 from dataclasses import replace
 

@@ -1,3 +1,5 @@
+"""The random split of frames."""
+
 import numpy as np
 import pytest
 

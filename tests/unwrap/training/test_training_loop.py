@@ -1,3 +1,5 @@
+"""Training: what it writes, resumed, interrupted, its schedule and configuration."""
+
 import json
 import os
 import signal
@@ -80,6 +82,7 @@ def test_resumed_training_equals_uninterrupted(tmp_path, monkeypatch):
     whole = train(SMALL, walls, tmp_path / "whole", progress=False)
     step = TrainingModule.training_step
 
+    # Eight frames in batches of four: step 3 is in the second of two epochs.
     def failing(self, batch, index):
         if self.global_step == 3:
             raise InterruptedHereError
@@ -95,6 +98,7 @@ def test_resumed_training_equals_uninterrupted(tmp_path, monkeypatch):
 
 
 def test_frames_acquired_ahead_train_the_same_weights(tmp_path, monkeypatch):
+    # A network that looks at samples, so that the noise of each draw matters.
     config = TrainConfig(network="phasenet", width=4, epochs=2, batch_size=2)
     alone = load_file(train(config, walls, tmp_path / "alone", progress=False))
     monkeypatch.setattr("unwrap.training.loop.acquiring_threads", lambda device: 2)
@@ -134,6 +138,7 @@ def test_tensorboard_has_loss_accuracy_and_pictures(tmp_path):
 
 
 def test_weights_depend_on_the_seed_alone():
+    # Whatever was drawn from torch's global generator before.
     torch.manual_seed(5)
     one = SMALL.build().state_dict()
     torch.manual_seed(6)
