@@ -227,6 +227,7 @@ class Bank:
 
     def _gather(self, name: str, indices: Sequence[int]) -> Tensor:
         """Array `name` of the frames `indices`, stacked; a single one is a view of the file."""
+        # Frame by frame: each lies in one piece in its clip's file, and only its pages are read.
         clips = [int(self._clip_of_frame[index]) for index in indices]
         frames = [
             self._arrays[clip][name].narrow(0, index - self.clips[clip].start, 1)

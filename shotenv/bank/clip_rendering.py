@@ -15,7 +15,7 @@ from shotenv.world import draw_world
 from shotenv.world.geometry import World
 
 METER_REDUCTION = 4
-"""The light meter sees one pixel where the camera sees so many each way."""
+"""The light meter sees one pixel where the camera sees so many each way; assumed."""
 
 GRAY_NOISE = -1
 """Number, among those of the frames, that seeds the noise of a clip's gray images."""

@@ -39,6 +39,7 @@ def measure_unwrapping(
 
 def _clip_scores(problem: Problem, clip: Clip) -> list[Scores]:
     bank = problem.bank
+    # The clips that this drive would play are drawn in vain: its frames are replaced by the clip's.
     drive = draw_drive(clip.seed, problem.config, problem.clips, bank.height, bank.width)
     frames = torch.arange(clip.start, clip.start + clip.frames)
     drive = dataclasses.replace(drive, frames=frames.unsqueeze(0))
@@ -57,7 +58,7 @@ def _clip_scores(problem: Problem, clip: Clip) -> list[Scores]:
                 {shots: acquisition.raw for shots, acquisition in made.items()},
                 predicted_m,
                 one.truth_m,
-                one.scored > 0,
+                one.scored,
                 problem.description,
                 offset_lsb=drive.offsets.calibrated_lsb,
                 noise_lsb=one.noise_lsb,

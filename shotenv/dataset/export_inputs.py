@@ -74,6 +74,7 @@ def bank_export_frames(
         looks at the gray image alone.
     """
     frames = bank.frames(split)
+    # Both ends and evenly between: neighbours in a clip look alike, and would check little.
     frames = frames[torch.linspace(0, len(frames) - 1, min(count, len(frames))).long()]
     source = f"{len(frames)} {split} frames of bank {bank.manifest.name}"
     if shots is None:

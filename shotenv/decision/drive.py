@@ -25,7 +25,7 @@ from unwrap.signal import Shots
 from unwrap.support import Range
 
 FAMILY_STAYS = 0.5
-"""Probability that the next clip is of the same family."""
+"""Probability that the next clip is of the same family; assumed."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,8 @@ def draw_drive(
     layout, body = stream(Purpose.DRIVE, seed, 0), stream(Purpose.DRIVE, seed, 1)
     # One frame more than are played: the last step, too, is followed by an observation.
     frames = chain_clips(clips, config.frames_per_drive + 1, generator=layout)
+    # Laser power, integration time, ambient and start temperature, whatever their ranges are: a
+    # range of no width does not shift the others.
     unit = torch.rand(4, dtype=torch.float64, generator=body)
     laser_power_w = _log_uniform(config.laser.optical_power_w, unit[0:1])
     integration_s = _log_uniform(config.sensor.integration_s, unit[1:2])

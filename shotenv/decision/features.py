@@ -141,6 +141,7 @@ def frame_shares(mask: Tensor) -> Tensor:
 
 def frame_spreads(maps: Tensor) -> Tensor:
     """Standard deviation of each of the maps [B, H, W], float64 [B]."""
+    # In two passes: the mean square less the squared mean would cancel in even images.
     means = frame_means(maps)[:, None, None].to(maps.dtype)
     return frame_means((maps - means) ** 2).sqrt()
 
@@ -166,7 +167,9 @@ def recently(since: Tensor) -> Tensor:
     return 1.0 - torch.exp(since / -16.0)
 
 
-# One line for each, however long: name and formula are read together.
+# One line for each, however long: name and formula are read together. The numbers in the formulas
+# bring usual values to about [-1, 1]; they are choices and no physics, and agents are trained with
+# them: another number is another observation.
 # fmt: off
 SCENE_FEATURES = (
     Feature("gray_mean", "full scale", "mean of the gray image", lambda s: frame_means(s.gray)),
@@ -184,6 +187,7 @@ SCENE_FEATURES = (
 )
 """Functions of a `Scene`."""
 
+# 6.9 is 3 ln 10: amplitudes of 0 to 1000 LSB are 0 to 1.
 SEEN_FEATURES = (
     Feature("amplitude", "log10 of LSB, over 3", "one plus the mean amplitude", lambda s: (s.amplitude_lsb / s.pixels).log1p() / 6.9),
     Feature("signal_to_noise", "1", "mean of q / (q + 1), q the amplitude over 4 sigma of a sample", lambda s: s.strength / s.pixels),
@@ -219,7 +223,8 @@ TOLD = torch.tensor(
         for shots in range(Shots.EIGHT + 1)
     ]
 )
-"""Which of the `SEEN_FEATURES` each number of samples tells, bool [9, S]; none without any."""
+"""Which of the `SEEN_FEATURES` each number of samples tells, bool [9, S]: row 2 is that of two
+samples, which leave out `residual` and `disagreement`, and row 0, of none, is all false."""
 
 
 def evaluated(features: Sequence[Feature], seen: Scene | Sums | Now) -> Tensor:

@@ -19,6 +19,7 @@ from unwrap.signal import Shots
 from unwrap.support import array, loop, put, take
 
 Array = np.ndarray
+# One Python float among them would make the arithmetic of the loops float64.
 ZERO, ONE_M, FOUR = np.float32(0.0), np.float32(1.0), np.float32(4.0)
 
 

@@ -16,6 +16,7 @@ def observe(problem: Problem, state: State) -> Tensor:
     drive, seen, laser, limits = state.drive, state.seen, state.laser, problem.config.laser
     # The first frame has none before it, and so no change.
     frame, before = drive.frame(state.step), drive.frame((state.step - 1).clamp(min=0))
+    # What the laser heads for: its trip, or while it is off the end of the pause.
     limit_k = torch.where(laser.tripped, limits.release_k, limits.trip_k)
     now = Now(
         gray_change=problem.scenes.change(before, frame),

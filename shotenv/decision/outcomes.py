@@ -68,6 +68,7 @@ def outcomes_of_all_actions(problem: Problem, drive: Drive) -> Outcomes:
     # What an action costs is the same in every frame.
     terms = {name: term.expand(frames, ACTIONS) for name, term in terms.items()}
 
+    # A tripped laser takes no samples and costs what the chips need.
     off = cost_of(problem, drive, torch.zeros(1, dtype=torch.int64), room_k)
     lost = no_depth(1, problem.config.sensor.max_range_m)
     tripped_terms = reward_terms(lost, off, drive.always_eight, torch.ones(1, dtype=torch.bool))

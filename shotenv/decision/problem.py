@@ -63,6 +63,7 @@ class Problem:
     description: SensorDescription
 
     def __reduce__(self):
+        # Another process opens bank and network for itself, and shares the pages of their files.
         return (open_problem, (self.config,))
 
     @property

@@ -71,5 +71,6 @@ def log_ambient_of(gray: Tensor, exposure_s: Tensor, sensor: SensorConfig) -> Te
     """Log10 of the ambient radiance on a coarse grid, [B, GRID * GRID], W m-2 sr-1."""
     full_scale_e = full_scale_lsb(sensor.adc_bits) / gray_gain_lsb_per_e(sensor)
     scale = full_scale_e / (electrons_per_radiance_second(sensor) * exposure_s)
+    # Averaged before the logarithm, which would turn noise in the dark into large changes.
     coarse = torch.nn.functional.adaptive_avg_pool2d(gray.unsqueeze(1), GRID).flatten(1)
     return (coarse * scale[:, None].to(gray.dtype)).clamp_(min=DARKEST_RADIANCE).log10_()

@@ -74,7 +74,7 @@ def score_depth(
         array(truth_m),
         array(scored, np.bool_),
         np.float32(error_scale_m),
-        np.float32(0.5 * unambiguous_m),
+        np.float32(0.5 * unambiguous_m),  # Less far off, the wrap count is right.
         range_m,
         score,
     )

@@ -23,10 +23,11 @@ from shotenv.decision import (
 )
 from shotenv.env.info import reset_infos, step_infos
 from shotenv.env.picture import paint_frame
+from unwrap.signal import Shots
 
 RENDER_MODES = ("rgb_array",)
 OBSERVATIONS = ("features",)
-ACTIONS = 3
+ACTIONS = len(Shots)
 
 
 def feature_space() -> spaces.Box:
@@ -74,6 +75,7 @@ def check_observation(observation: str) -> None:
 
 def drive_seed(generator: np.random.Generator) -> int:
     """Seed of the next drive."""
+    # Seeds of drives are kept in int64 tensors, so they stay below 2^63.
     return int(generator.integers(2**62))
 
 
@@ -119,6 +121,8 @@ class ShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
         check_observation(observation)
         self.render_mode = check_render_mode(render_mode)
         self.problem = open_problem(env_config(config, **fields))
+        # Of this environment, where the class can only tell the usual: a film plays in real time.
+        self.metadata = {**self.metadata, "render_fps": self.problem.config.frame_rate_hz}
         self.feature_names = FEATURE_NAMES
         self.observation_space = feature_space()
         self.action_space = spaces.Discrete(ACTIONS)

@@ -69,13 +69,13 @@ class ShotScheduleVectorEnv(VectorEnv):
         check_observation(observation)
         self.num_envs = _check_count(num_envs)
         self.autoreset_mode = _check_mode(autoreset_mode)
-        self.metadata = {
-            "render_modes": list(RENDER_MODES),
-            "render_fps": 10,
-            "autoreset_mode": self.autoreset_mode,
-        }
         self.render_mode = check_render_mode(render_mode)
         self.problem = open_problem(env_config(config, **fields))
+        self.metadata = {
+            "render_modes": list(RENDER_MODES),
+            "render_fps": self.problem.config.frame_rate_hz,
+            "autoreset_mode": self.autoreset_mode,
+        }
         self.feature_names = FEATURE_NAMES
         self.single_observation_space = feature_space()
         self.single_action_space = spaces.Discrete(ACTIONS)
@@ -132,6 +132,7 @@ class ShotScheduleVectorEnv(VectorEnv):
         truncated = self._over & ~resting
         restarted = resting
         if self.autoreset_mode == AutoresetMode.SAME_STEP:
+            # Of the drives that are over; below, new ones take their place in the state.
             restarted, last = truncated, self._observations()
             for row in np.flatnonzero(truncated).tolist():
                 infos[row] = {"final_obs": last[row], "final_info": infos[row]}

@@ -39,6 +39,6 @@ def _current(electrical_power_w: Array, laser: LaserConfig) -> Array:
 def _arrhenius(temperature_k: Array, laser: LaserConfig) -> Array:
     if not laser.activation_energy_ev:
         return 1.0
-    kelvin = laser.activation_energy_ev / BOLTZMANN_EV_PER_K
-    # e to an array, for either library.
-    return math.e ** (kelvin / laser.rated_k - kelvin / temperature_k)
+    activation_k = laser.activation_energy_ev / BOLTZMANN_EV_PER_K
+    # Not `exp`, which NumPy and torch each have for their own arrays alone.
+    return math.e ** (activation_k / laser.rated_k - activation_k / temperature_k)

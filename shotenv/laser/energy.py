@@ -15,6 +15,7 @@ from shotenv.laser.cost import ShotCost
 Array = Any
 SECONDS_PER_HOUR = 3600.0
 MOST_SHOTS = 8
+"""Samples of the longest acquisition, `unwrap.signal.Shots.EIGHT`."""
 
 
 class NetworkWork(NamedTuple):
@@ -50,10 +51,12 @@ def emitted_power_w(power_w: Array, temperature_k: Array, laser: LaserConfig) ->
 def efficiency_at(temperature_k: Array, laser: LaserConfig) -> Array:
     """Optical over electrical power; falls linearly from 25 C to the trip temperature.
 
-    A VCSEL loses about 0.001 to 0.003 per kelvin (assumed). No light is made above the trip.
+    A VCSEL loses about 0.001 to 0.003 per kelvin (assumed).
     """
     if not laser.efficiency_slope_per_k:
         return laser.efficiency
+    # No light is made above the trip; without that bound the line would fall through zero, and a
+    # division by it follows.
     above_k = (temperature_k - ROOM_K).clip(0.0, max(laser.trip_k - ROOM_K, 0.0))
     return laser.efficiency - laser.efficiency_slope_per_k * above_k
 
@@ -105,6 +108,8 @@ def shot_cost(
     network : NetworkWork
         None by default.
     """
+    # Power and efficiency are those at the start of the frame, in which the junction warms by
+    # tenths of a kelvin. Modulation is in `optical_power_w` already, a mean while on.
     on_s = shots * integration_s
     electrical_w = optical_power_w / efficiency_at(temperature_k, laser)
     optical_j, laser_j = on_s * optical_power_w, on_s * electrical_w

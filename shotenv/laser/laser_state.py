@@ -64,4 +64,5 @@ def laser_step(
 
 def too_bright(state: LaserState, laser: LaserConfig) -> Tensor:
     """Where the average power exceeds the cap for eyes, bool [B]; nowhere without a cap."""
+    # A limit of 0 switches the cap off; it does not forbid all light.
     return state.eye_power_w > (laser.eye_limit_w or float("inf"))

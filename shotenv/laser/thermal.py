@@ -16,6 +16,7 @@ Array = Any
 
 def relaxed(value: Array, steady: Array, time_constant_s: float, period_s: float) -> Array:
     """Exact solution of `tau dx/dt = steady - x` after `period_s`, from `value`."""
+    # Exact for any period: an Euler step would overshoot where the period nears the time constant.
     return steady + (value - steady) * math.exp(-period_s / time_constant_s)
 
 
@@ -35,4 +36,5 @@ def junction_step(rise_k: Array, heat_j: Array, laser: LaserConfig, period_s: fl
 
 def trip_step(tripped: Array, temperature_k: Array, laser: LaserConfig) -> Array:
     """Whether the laser is off in the next frame: on at `trip_k`, back below `release_k`."""
+    # Two thresholds: with a single one the laser would go on and off in turn at its limit.
     return (temperature_k >= laser.trip_k) | (tripped & (temperature_k >= laser.release_k))

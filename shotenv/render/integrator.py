@@ -135,6 +135,8 @@ class _Onward:
         scatters = ~mirrors & ~passes
         scattered = mi.Frame3f(hit.normal).to_world(mi.warp.square_to_cosine_hemisphere(sample))
         mirrored = direction - 2 * dr.dot(direction, hit.normal) * hit.normal
+        # One number serves this choice and the lamp's: within its share it is uniform again once
+        # that share is stretched to [0, 1).
         below = dr.select(mirrors, 0, dr.select(passes, hit.mirror, hit.mirror + hit.clear))
         share = dr.select(mirrors, hit.mirror, dr.select(passes, hit.clear, hit.diffuse))
         return cls(

@@ -38,6 +38,8 @@ class _Choice:
 
         The random number is stretched back to [0, 1) for the next offer.
         """
+        # Weighted reservoir sampling with room for one (Chao, 1982): what is offered need not be
+        # known beforehand, and no table of it is kept.
         total = self.total + irradiance
         share = dr.select(total > 0, irradiance / total, 0)
         taken = self.number < share
@@ -180,6 +182,7 @@ class _Opening:
 
     def lets_in(self, point, direction):
         """Whether a point is outdoors, or a ray from it in this direction leaves by the opening."""
+        # Rays along the wall divide by 0: they cross at infinity or NaN, and neither is inside.
         crossing = point + (self._from.x - point.x) / direction.x * direction
         through = (crossing.y > self._from.y) & (crossing.y < self._to.y)
         through &= (crossing.z > self._from.z) & (crossing.z < self._to.z)
@@ -192,6 +195,7 @@ def _opaque_point(numbers):
 
 def spot_falloff(cos_axis, cutoff_cos):
     """Intensity towards an angle from the axis: a smooth step from 0 at the cutoff to 1 ahead."""
+    # A cutoff of -1 shines everywhere, and the step from 0 to 1 would have no room.
     t = dr.clip((cos_axis - cutoff_cos) / (1 - cutoff_cos), 0, 1)
     return dr.select(cutoff_cos <= -1, 1, t * t * (3 - 2 * t))
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from shotenv.render.backend import upload
 from shotenv.render.instants import Instants
+from unwrap.signal import SPEED_OF_LIGHT_M_S
 
-SPEED_OF_LIGHT_M_S = 299_792_458.0
 Harmonics = tuple[tuple[int, float], ...]
 """Odd harmonics 1, 3, 5, ... and their weights."""
 FUNDAMENTAL: Harmonics = ((1, 1.0),)

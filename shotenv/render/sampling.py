@@ -13,7 +13,7 @@ from shotenv.config import CameraConfig
 from shotenv.render.instants import Instants
 
 # Additive recurrences of low discrepancy in one and two dimensions: the inverse powers of the
-# golden ratio and of the plastic number.
+# golden ratio and of the plastic number (R1 and R2 of Roberts, 2018).
 _STEP_1D = 0.6180339887498949
 _STEP_2D = (0.7548776662466927, 0.5698402909980532)
 

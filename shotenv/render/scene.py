@@ -91,6 +91,7 @@ class Scene:
         valid, face = near.valid, near.face
         distance = dr.select(valid, near.distance_m, 0)
         normal = dr.gather(mi.Vector4f, self._normals, near.posed_face, valid).xyz
+        # Both sides of a surface are alike; its normal is turned towards the ray.
         normal = dr.select(dr.dot(normal, direction) > 0, -normal, normal)
         low, high, retro, emission = dr.gather(mi.Vector4f, self._still.surface, face, valid)
         first, rest = (

@@ -7,10 +7,13 @@ import functools
 import numpy as np
 
 RESOLUTION = 256
+_OCTAVE_GAIN = 0.6
+"""Strength of an octave over that of the coarser one before; assumed."""
 _SEED = 20231
 """Fixed: another texture would change every rendered bank."""
 _COARSEST_CELLS = 4
 _OCTAVES = 6
+"""The finest cells are two texels wide: more octaves would be finer than the texture."""
 
 
 @functools.cache
@@ -20,7 +23,7 @@ def noise_texture() -> np.ndarray:
     total = np.zeros((RESOLUTION, RESOLUTION))
     for octave in range(_OCTAVES):
         cells = _COARSEST_CELLS * 2**octave
-        total += _value_noise(rng.uniform(-1.0, 1.0, (cells, cells))) * 0.6**octave
+        total += _value_noise(rng.uniform(-1.0, 1.0, (cells, cells))) * _OCTAVE_GAIN**octave
     # Clipped at both ends, so that albedos reach the whole range that their finish gives.
     low, high = np.quantile(total, [0.01, 0.99])
     return np.clip((total - low) / (high - low), 0.0, 1.0).astype(np.float32)

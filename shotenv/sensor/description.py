@@ -12,7 +12,8 @@ from unwrap.signal import (
 )
 
 TRUSTED_SPACING = 0.4
-"""Two frequencies are trusted where they agree within this share of their candidates' spacing.
+"""Two frequencies are trusted where they agree within this share of their candidates' spacing;
+the value is assumed.
 
 At half the spacing the next pair of wraps would agree as well; see `unwrap.depth.unwrap_dual`.
 """

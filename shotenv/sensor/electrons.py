@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 from shotenv.config import SensorConfig
+from unwrap.signal import SPEED_OF_LIGHT_M_S
 
 PLANCK_J_S = 6.62607015e-34
-SPEED_OF_LIGHT_M_S = 299_792_458.0
+"""Exact, by the definition of the kilogram (SI, 2019)."""
 
 
 def photon_energy_j(wavelength_nm: float) -> float:

@@ -14,7 +14,7 @@ from shotenv.sensor.pixel_loops import noise_by_gray_, take_gray_
 from unwrap.support import array
 
 SHORTEST_EXPOSURE_S = 1e-5
-"""What the light meter stops at in a scene however bright, s."""
+"""What the light meter stops at in a scene however bright, s; assumed."""
 
 
 def capture_gray(
@@ -57,6 +57,7 @@ def gray_exposure_s(ambient: Tensor, sensor: SensorConfig) -> Tensor:
     """Exposure [B] that brings the mean to `gray_target` of full scale, within its limits, s."""
     mean_rate_e_s = ambient.mean(dim=(-2, -1)) * electrons_per_radiance_second(sensor)
     wanted_e = sensor.gray_target * sensor.full_well_e
+    # Without any light the quotient is infinite, and the clamp makes the longest exposure of it.
     return (wanted_e / mean_rate_e_s).clamp(SHORTEST_EXPOSURE_S, sensor.gray_max_exposure_s)
 
 
@@ -77,6 +78,7 @@ def sample_noise_lsb(
     # variance: LSB^2 of the sample per word of the gray image.
     squared_gain = sensor.gain_lsb_per_e**2
     gain, per_word = squared_gain / gray_gain_lsb_per_e(sensor), np.empty(len(gray), np.float32)
+    # In float64, and rounded once as it is stored.
     per_word[:] = integration_s.numpy() / exposure_s.numpy() * gain
     dark = 2.0 * squared_gain * sensor.read_noise_e**2
     noise_lsb = np.empty(gray.shape, np.float32)

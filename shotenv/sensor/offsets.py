@@ -56,4 +56,5 @@ def draw_offsets(
     # Drawn whatever the temperature, so that the generator is left in the same state.
     drift = torch.randn(height, width, generator=generator)
     drift.mul_(sensor.offset_drift_lsb_per_k * warmer_k)
+    # The map holds a share of every pixel's value, so that what it misses has the same pattern.
     return OffsetPattern(pattern + drift, sensor.offset_calibrated_share * pattern)

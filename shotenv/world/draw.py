@@ -16,9 +16,11 @@ WIDEST_SWERVE_M = 0.4
 CAMERA_HEIGHT_M = (0.6, 1.2)
 """From a car's bumper to its wind screen."""
 CAMERA_PITCH_RAD = (-0.03, 0.03)
+"""1.7 degrees up or down; assumed."""
 YAW_RATE_STD_RAD_S = 0.04
+"""Of the bends that a lane has, before they are limited to what stays in it; assumed."""
 STANDING_SHARE = 0.2
-"""Share of the clips in which the ego stands still, as at lights or when parked."""
+"""Share of the clips in which the ego stands still, as at lights or when parked; assumed."""
 
 
 def draw_world(family: Family, seed: int, config: WorldConfig) -> World:
@@ -77,6 +79,7 @@ def draw_ego_speed(
             f"speed_m_s is ({low:g}, {high:g}); expected at most {LONGEST_DRIVE_M / duration_s:g} "
             f"at its low end: a clip of {duration_s:g} s is driven in {LONGEST_DRIVE_M:g} m"
         )
+    # The range that was asked for has the last word: a place of slow cars is then driven faster.
     wish = 0.0 if rng.random() < STANDING_SHARE else rng.uniform(*usual)
     return float(np.clip(wish, low, min(high, LONGEST_DRIVE_M / duration_s)))
 

@@ -22,26 +22,38 @@ from unwrap.signal.shots import Shots
 
 STEPS = 500
 PROGRAM = """
-import json, sys, hashlib
-import gymnasium, numpy as np, torch
-import shotenv
+import json, sys, torch
 torch.set_num_threads(int(sys.argv[2]))
 sys.path.insert(0, sys.argv[3])
-from test_determinism import digest
-print(digest(json.loads(sys.argv[1])))
+from test_determinism import played
+print(json.dumps(played(json.loads(sys.argv[1]))))
 """
 
 
-def digest(kwargs) -> str:
-    """SHA-256 over everything that a vector of two tells in some steps through an auto-reset."""
+def played(kwargs) -> list[str]:
+    """A line for each part of what a vector of two tells, in some steps through an auto-reset.
+
+    One by one, and not one sum over all, so that a difference names the step and the part.
+    """
     env = gymnasium.make_vec(shotenv.ENV_ID, num_envs=2, **kwargs)
-    summary = hashlib.sha256(env.reset(seed=17)[0].tobytes())
-    actions = np.random.default_rng(0).integers(0, 3, (34, 2))
-    for chosen in actions:
+    told: list[tuple[str, object]] = [
+        ("predicted", env.unwrapped.problem.kept.distance_m.numpy()),
+        ("reset observation", env.reset(seed=17)[0]),
+    ]
+    for number, chosen in enumerate(np.random.default_rng(0).integers(0, 3, (34, 2))):
         observation, reward, _, truncated, info = env.step(chosen)
-        for part in (observation, reward, truncated, info.get("vector_reward", reward)):
-            summary.update(np.ascontiguousarray(part).tobytes())
-    return summary.hexdigest()
+        vector_reward = info.get("vector_reward", reward)  # Absent where all drives just restart.
+        told += [
+            (f"{number} observation", observation),
+            (f"{number} reward", reward),
+            (f"{number} truncated", truncated),
+            (f"{number} vector reward", vector_reward),
+        ]
+    return [f"{name}: {sha256_of(part)}" for name, part in told]
+
+
+def sha256_of(values) -> str:
+    return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
 
 
 def test_two_environments_agree_over_500_steps_and_an_auto_reset(tiny_kwargs):
@@ -58,19 +70,28 @@ def test_two_environments_agree_over_500_steps_and_an_auto_reset(tiny_kwargs):
             assert np.array_equal(*(twin.reset()[0] for twin in twins))
 
 
-def test_fresh_processes_agree_whatever_hash_seed_and_threads(tiny_kwargs):
+def test_fresh_processes_agree_whatever_hash_seed_and_threads(tiny_kwargs, tmp_path):
     here = str(Path(__file__).parent)
-    found = {digest(tiny_kwargs)}
+    # First, and alone: it compiles the loops, which the other processes then find on disk.
+    expected = played(tiny_kwargs)
+    started = []
     for hash_seed, threads in (("1", "1"), ("2", "2")):
-        done = subprocess.run(
+        # Each predicts for itself, too: with the session's cache they would read what this process
+        # has predicted, and not find out whether their threads matter.
+        cache = str(tmp_path / f"cache{threads}")
+        process = subprocess.Popen(
             [sys.executable, "-c", PROGRAM, json.dumps(tiny_kwargs), threads, here],
-            env={**os.environ, "PYTHONHASHSEED": hash_seed},
-            capture_output=True,
+            env={**os.environ, "PYTHONHASHSEED": hash_seed, "SHOTENV_CACHE": cache},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
             text=True,
-            check=True,
         )
-        found.add(done.stdout.strip())
-    assert len(found) == 1
+        started.append(process)
+    # Both are waited for before anything is judged, so that none outlives a failed test.
+    ended = [(*process.communicate(), process.returncode) for process in started]
+    for output, errors, status in ended:
+        assert status == 0, errors
+        assert json.loads(output) == expected
 
 
 def test_large_frames_do_not_depend_on_threads_or_batch(sensor):

@@ -8,6 +8,7 @@ from .decoding import (
 from .description import SensorDescription as SensorDescription
 from .frames import DepthFrame as DepthFrame, PhaseFrame as PhaseFrame, RawFrame as RawFrame
 from .frequencies import (
+    SPEED_OF_LIGHT_M_S as SPEED_OF_LIGHT_M_S,
     candidate_spacing_m as candidate_spacing_m,
     joint_range_m as joint_range_m,
     unambiguous_range_m as unambiguous_range_m,

@@ -6,6 +6,10 @@ ceilings, which nothing keeps off; `put_...` for things that stay out of each ot
 left out where no room is free; `paint_...` for lines. What only draws a thing, and returns its
 mesh, is named after the thing. Things that other families may show as well are in
 `shotenv.world.things`; the files of held-out families have theirs to themselves.
+
+Lane widths, bays and clear heights are usual ones. How often something is there (`rng.random() <
+0.3`), how fast it moves and how far off it stands is assumed, so that clips differ and many have
+something close by.
 """
 
 import lazy_loader

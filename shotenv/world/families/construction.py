@@ -12,7 +12,8 @@ from shotenv.world.geometry import Lamp, Mesh, Motion, Pose, Site, lights, mater
 from shotenv.world.things import people, wheel
 
 FLOOD_IRRADIANCE = (5e-3, 5e-2)
-"""Irradiance in band of a flood light at twice its height's distance, W m-2; an assumed range."""
+"""Irradiance in band of a flood light, at a distance of twice its height, W m-2; an assumed
+range."""
 
 
 def lay_out_construction_site(site: Site, rng: np.random.Generator) -> None:

@@ -203,7 +203,7 @@ def build_ceiling_lamps(
     low = height - 0.14
     for along in np.arange(x[0] + 1.5, x[1] - 1.0, pitch):
         for y in rows:
-            alive = rng.random() < 0.92
+            alive = rng.random() < 0.92  # Assumed.
             tube = buildings.tube_lamp(TUBE_LAMP_M, radiance if alive else 0.0, casing, height)
             site.build(meshes.at(tube, along, y))
             if alive:
@@ -216,6 +216,7 @@ def lay_out_tunnel(site: Site, rng: np.random.Generator) -> None:
     """A two-lane tube with lamps and kerbs; its exit opens on a road in daylight."""
     lane = rng.uniform(3.0, 3.6)
     centre, half = lane / 2, lane + rng.uniform(0.9, 1.6)
+    # The ego may leave the tunnel within the clip or see its exit ahead all the time.
     exit_x = site.travel_m * rng.uniform(0.3, 1.0) + rng.uniform(4.0, 26.0)
     section = tube_section(rng, half)
     build_tube(site, rng, section, centre, exit_x)

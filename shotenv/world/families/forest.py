@@ -18,6 +18,7 @@ def lay_out_forest_path(site: Site, rng: np.random.Generator) -> None:
     build_trodden_strip(site, rng, half)
     build_puddles(site, rng, (-1.5, 1.5))
     if rng.random() < 0.45:
+        # The power favours short distances, and most obstacles of the near field are close.
         x = site.travel_m + 1.5 + 7.0 * rng.uniform() ** 1.5
         site.put(fallen_tree(rng), x, rng.uniform(-1.0, 1.0), rng.uniform(1.2, 1.9))
     put_walkers(site, rng, (0, 3), (-half + 0.2, half - 0.2), 0.004)
@@ -179,6 +180,7 @@ def deer(rng: np.random.Generator) -> Mesh:
     coat, size = m.Finish((0.30, 0.50), 0.2, 0.4).draw(rng), rng.uniform(0.75, 1.15)
     stride = rng.uniform(-0.15, 0.15)
     legs_at = [(x + s * stride, 0.09 * s, x) for x in (-0.42, 0.38) for s in (-1, 1)]
+    # Trunk, legs, neck, head, ears.
     parts = [
         meshes.rod((-0.5, 0, 0.88), (0.45, 0, 0.92), 0.2, coat, sections=8),
         *(meshes.rod((foot, y, 0.0), (x, y, 0.85), 0.045, coat, 5) for foot, y, x in legs_at),

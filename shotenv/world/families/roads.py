@@ -142,6 +142,7 @@ def build_carriageway(
     far = site.travel_m + REACH_M
     site.build(meshes.patch((-BEHIND_M, far), (right, left), 0.0, m.ASPHALT.draw(rng)))
     paint = m.ROAD_PAINT.draw(rng)
+    # Dashes of country roads, towns and crossings; assumed to be as often each.
     period, dash = ((9.0, 4.5), (6.0, 3.0), (4.0, 2.0))[rng.integers(3)]
     for x in np.arange(-2 * period + rng.uniform(0, period), site.travel_m + 50.0, period):
         site.build(meshes.patch((x, x + dash), (lane / 2 - 0.06, lane / 2 + 0.06), PAINT_M, paint))
@@ -150,6 +151,7 @@ def build_carriageway(
             site.build(meshes.patch((-BEHIND_M, far), (y - 0.06, y + 0.06), PAINT_M, paint))
     if rng.random() < 0.3:
         start = site.travel_m * rng.uniform() + rng.uniform(4, 12)
+        # A zebra crossing, above the lines that it crosses.
         for y in np.arange(right + 0.3, left - 0.6, 1.0):
             site.build(meshes.patch((start, start + 3.5), (y, y + 0.5), PAINT_M + 0.002, paint))
     if rng.random() < 0.5:
@@ -202,6 +204,7 @@ def side_walk(
 
 def put_facades(site: Site, rng: np.random.Generator, y: float, yaw: float) -> None:
     """Buildings, walls, hedges and gaps along a line."""
+    # From behind the ego on, so that the first building does not begin in the picture.
     x = rng.uniform(-12.0, -4.0)
     while x < site.travel_m + 32.0:
         length, kind = rng.uniform(6.0, 12.0), rng.random()
@@ -213,6 +216,7 @@ def put_facades(site: Site, rng: np.random.Generator, y: float, yaw: float) -> N
             site.put(buildings.facade(rng, length, site.night), centre, y, yaw, KERB_M)
         elif kind < 0.9:
             site.put(hedge_or_wall(rng, length), centre, y, yaw, KERB_M)
+        # Wall to wall, or with an alley between.
         x += length + rng.choice([0.2, 0.2, 3.0])
 
 

@@ -38,6 +38,7 @@ def lay_out_snowy_street(site: Site, rng: np.random.Generator) -> None:
     if rng.random() < 0.4:
         x = site.travel_m + 1.0 + 6.0 * rng.uniform() ** 1.5
         blocking = draw_one(rng, (snow_bank, snowman))
+        # Half its length further off: its near side is to be at x, and not its middle.
         site.put(blocking, x - float(blocking.corners[..., 0].min()), rng.uniform(-0.8, 0.8), np.pi)
     put_street_lamps(site, rng, -half - 0.6, rng.uniform(14, 24))
     for side in (-1, 1):
@@ -84,6 +85,7 @@ def snow_bank(rng: np.random.Generator) -> Mesh:
     lumps = [
         meshes.blob(rng, 0.65, snow, (rng.uniform(-0.1, 0.1), y, 0.0)) for y in (-0.6, 0.0, 0.6)
     ]
+    # Balls with their middle on the ground, pressed to the height of the bank.
     return meshes.scaled(meshes.join(lumps), (1.0, 1.0, high / 0.65))
 
 

@@ -124,6 +124,7 @@ def put_approaching(
 
 def head_lights(mesh: Mesh, intensity_w_sr: float, carrier: int) -> list[Lamp]:
     """Head lights of a vehicle, which they move with: two, or one on what is narrow."""
+    # A little before the body, which would otherwise stand in their light.
     nose, half = float(mesh.corners[..., 0].max()) + 0.15, float(mesh.corners[..., 1].max())
     sides = (0.0,) if half < 0.6 else (0.3 - half, half - 0.3)
     ahead, cutoff = lights.direction(0.0, -0.03), float(np.cos(0.5))

@@ -26,6 +26,7 @@ RACK_DEPTH_M = 1.1
 BAY_M = 2.7
 """Width of a rack's bay: room for two pallets side by side."""
 LAMP_M = (0.6, 0.4)
+"""Length and width of the glowing face of a high-bay lamp."""
 HIGH_BAY_IRRADIANCE: Range = (1e-2, 0.3)
 """Irradiance in band straight below one lamp, W m-2; an assumed range."""
 

@@ -53,26 +53,25 @@ def sunny(rng: np.random.Generator, low_share: float = 0.3) -> Light:
 
 def low_sun(rng: np.random.Generator) -> Light:
     """Sun at 2.5 to 15 degrees: long shadows; the sky is darker overhead, bright at the horizon."""
-    elevation, haze = np.radians(rng.uniform(2.5, 15.0)), rng.uniform(0.0, 0.35)
-    zenith = rng.uniform(0.12, 0.3)
-    return Light(
-        sun_irradiance=sun_irradiance(elevation) * (1.0 - haze),
-        sun_direction=direction(rng.uniform(-np.pi, np.pi), elevation),
-        sky_zenith=zenith,
-        sky_horizon=zenith * rng.uniform(1.4, 2.2),
-        lamps=(),
-    )
+    return _sun_and_sky(rng, (2.5, 15.0), zenith=(0.12, 0.3), brighter=(1.4, 2.2))
 
 
 def high_sun(rng: np.random.Generator) -> Light:
     """Sun at 15 to 60 degrees, more or less haze, and a sky that is brighter at the horizon."""
-    elevation, haze = np.radians(rng.uniform(15.0, 60.0)), rng.uniform(0.0, 0.35)
-    zenith = rng.uniform(0.3, 0.45)
+    return _sun_and_sky(rng, (15.0, 60.0), zenith=(0.3, 0.45), brighter=(1.1, 1.4))
+
+
+def _sun_and_sky(
+    rng: np.random.Generator, elevation_deg: Range, zenith: Range, brighter: Range
+) -> Light:
+    """Sun through haze from any side; the horizon is `brighter` times as bright as the zenith."""
+    elevation, haze = np.radians(rng.uniform(*elevation_deg)), rng.uniform(0.0, 0.35)
+    overhead = rng.uniform(*zenith)
     return Light(
         sun_irradiance=sun_irradiance(elevation) * (1.0 - haze),
         sun_direction=direction(rng.uniform(-np.pi, np.pi), elevation),
-        sky_zenith=zenith,
-        sky_horizon=zenith * rng.uniform(1.1, 1.4),
+        sky_zenith=overhead,
+        sky_horizon=overhead * rng.uniform(*brighter),
         lamps=(),
     )
 
@@ -80,6 +79,7 @@ def high_sun(rng: np.random.Generator) -> Light:
 def overcast(rng: np.random.Generator) -> Light:
     """No sun; the sky is up to three times brighter overhead than at the horizon (CIE overcast)."""
     zenith = log_uniform(rng, (0.2, 1.0))
+    # Any unit vector will do for a sun that is not there.
     return Light(0.0, (0.0, 0.0, 1.0), zenith, zenith / rng.uniform(1.8, 3.0), ())
 
 
@@ -98,6 +98,7 @@ def is_dark(light: Light) -> bool:
 
 def ego_headlights(rng: np.random.Generator) -> tuple[Lamp, ...]:
     """Two head lights beside the camera: LED ones hardly shine in band, halogen ones do."""
+    # One draw for both, which are alike; aimed 3 degrees down, with nothing beyond 26 degrees.
     intensity = log_uniform(rng, (0.05, 3.0))
     return tuple(
         Lamp((0.2, y, 0.65), intensity, 0.1, direction(0.0, -0.05), float(np.cos(0.45)), rides=True)

@@ -110,6 +110,7 @@ def log_uniform(rng: np.random.Generator, bounds: Range) -> float:
     return float(np.exp(rng.uniform(np.log(bounds[0]), np.log(bounds[1]))))
 
 
+# Mean albedo, swing of the texture about it, length after which the texture repeats in metres.
 ASPHALT = Finish((0.08, 0.20), 0.40, 2.5)
 CONCRETE = Finish((0.30, 0.40), 0.25, 3.0)
 PAVING = Finish((0.25, 0.40), 0.30, 1.2)
@@ -119,16 +120,19 @@ FOLIAGE = Finish((0.40, 0.60), 0.50, 0.8)
 BARK = Finish((0.20, 0.35), 0.50, 0.6)
 SKIN = Finish((0.35, 0.60), 0.05, 0.5)
 HAIR = Finish((0.05, 0.25), 0.30, 0.2)
+# Most dyes absorb nothing in the near infrared: cloth is bright there, whatever its colour.
 CLOTHES = Finish((0.30, 0.70), 0.25, 0.5)
 DARK_CLOTHES = Finish((0.08, 0.35), 0.25, 0.5)
 LEATHER = Finish((0.05, 0.20), 0.20, 0.3)
 WHITE_PAINT = Finish((0.70, 0.85), 0.10, 1.0)
+# Glass beads in the paint throw light back; drivers at night see it by them.
 ROAD_PAINT = Finish((0.55, 0.80), 0.25, 0.8, retro=(2.0, 10.0))
 BLACK_CAR_PAINT = Finish((0.03, 0.08), 0.10, 2.0, mirror=(0.04, 0.08))
 COLOUR_CAR_PAINT = Finish((0.15, 0.60), 0.08, 2.0, mirror=(0.04, 0.08))
 WHITE_CAR_PAINT = Finish((0.65, 0.80), 0.05, 2.0, mirror=(0.04, 0.08))
 TYRE = Finish((0.03, 0.05), 0.20, 0.3)
 RUBBER = Finish((0.04, 0.08), 0.20, 0.5)
+# Opaque: windows that nothing is to be seen through, and that need not be traced through.
 GLASS = Finish((0.02, 0.06), 0.30, 3.0, mirror=(0.06, 0.15))
 CLEAR_GLASS = Finish((0.02, 0.10), 0.30, 3.0, mirror=(0.06, 0.12), clear=(0.65, 0.85))
 TINTED_GLASS = Finish((0.02, 0.06), 0.30, 3.0, mirror=(0.06, 0.12), clear=(0.15, 0.60))
@@ -147,6 +151,8 @@ BRICK = Finish((0.30, 0.50), 0.30, 0.9)
 PLASTER = Finish((0.45, 0.75), 0.15, 3.0)
 WOOD = Finish((0.35, 0.60), 0.30, 0.7)
 CARDBOARD = Finish((0.45, 0.65), 0.15, 0.6)
+# Times the Lambertian return: lamp housings send some light back, sheets of beads or prisms most of
+# it, in a narrow cone about the way that it came.
 LENS = Finish((0.30, 0.50), 0.20, 0.2, retro=(5.0, 30.0))
 RETRO_SHEET = Finish((0.40, 0.60), 0.05, 1.0, retro=(100.0, 1000.0))
 PLATE_SHEET = Finish((0.50, 0.70), 0.10, 0.3, retro=(50.0, 200.0))

@@ -30,6 +30,7 @@ _CORNERS = np.arange(3)[None, :, None]
 
 def soup(corners: np.ndarray, material: Material) -> Mesh:
     """Triangles [F, 3, 3] in metres, all of one material."""
+    # One material for all faces now; once joined, faces of many lie in the same arrays.
     numbers = np.array([getattr(material, name) for name in _PER_FACE], dtype=np.float32)
     per_face = numbers[:, None].repeat(len(corners), axis=1)
     return Mesh(
@@ -116,6 +117,7 @@ def frame(outline: Sequence[Point], pane: Sequence[Point] | np.ndarray, material
 def polygon(points: Sequence[Point] | np.ndarray, material: Material) -> Mesh:
     """A flat convex polygon, corners counter-clockwise seen from its front."""
     ring = np.asarray(points, dtype=np.float64)
+    # A fan of triangles about the first corner: right for convex outlines alone.
     first = np.broadcast_to(ring[:1], (len(ring) - 2, 3))
     return soup(np.stack([first, ring[1:-1], ring[2:]], axis=1), material)
 

@@ -76,6 +76,7 @@ class Motion:
         turned = self.yaw_rate_rad_s * time_s
         # Chord of the arc: speed * t * sin(h) / h in the direction start yaw + h, h half the turn.
         half = turned / 2
+        # sin(h) / h tends to 1: on a straight line the chord is the way itself.
         chord = self.speed_m_s * time_s * (math.sin(half) / half if half else 1.0)
         heading = self.start.yaw_rad + half
         x, y, z = self.start.position_m

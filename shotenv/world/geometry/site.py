@@ -71,6 +71,7 @@ class Site:
         self.room = np.array([[-np.inf, -np.inf], [np.inf, np.inf]])
         self.ceiling_m = np.inf
         way = np.array([ego.at(time).position_m[:2] for time in self.times])
+        # The ego is the first to take ground, so that nothing can be put in its way.
         margin = np.array([EGO_AHEAD_M, EGO_BESIDE_M])
         self._taken = [np.stack([way - margin, way + margin], axis=1)]
         self._triangles = 0
@@ -136,6 +137,7 @@ class Site:
             return False
         if any(overlap(taken, other) for other in self._taken):
             return False
+        # Whoever comes first has the ground: later things see it as taken, at each instant.
         self._taken.append(taken)
         self._triangles += len(mesh.corners)
         return True
@@ -156,5 +158,7 @@ def footprints(mesh: Mesh, poses: list[Pose]) -> np.ndarray:
 
 def overlap(a: np.ndarray, b: np.ndarray) -> bool:
     """Whether two footprints come closer than a gap at any instant; static ones have T = 1."""
+    # Rectangles are apart if they are so along either axis; one that stands still is compared with
+    # each instant of the other by broadcasting.
     apart = (a[:, 0] > b[:, 1] + GAP_M) | (b[:, 0] > a[:, 1] + GAP_M)
     return bool((~apart.any(axis=1)).any())

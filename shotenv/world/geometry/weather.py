@@ -63,6 +63,7 @@ def weathered(mesh: Mesh, weather: Weather) -> Mesh:
 
 def wetted(mesh: Mesh, wetness: float) -> Mesh:
     """`mesh` with its level faces wet; 0 leaves it as it is."""
+    # Water runs off whatever is steeper.
     amount = wetness * (_upward(mesh) > LEVEL_COS)
     rest = np.float32(1.0 - WET_DARKENING * amount)
     return replace(

@@ -22,6 +22,7 @@ def wall(rng: np.random.Generator, length_m: float, height_m: float) -> Mesh:
         [
             meshes.box((0.30, length_m, height_m), body, (-0.2, 0.0, 0.0)),
             meshes.box((0.36, length_m, 0.3), trim, (-0.2, 0.0, 0.0)),
+            # A millimetre above, where two faces in one plane would take turns in the picture.
             meshes.box((0.40, length_m + 0.02, 0.08), trim, (-0.2, 0.0, height_m + 0.001)),
         ]
     )
@@ -49,6 +50,7 @@ def window(rng: np.random.Generator, y: float, sill_m: float, lit: bool) -> Mesh
     """A framed pane, a sill; at night one window in three is lit."""
     frame, glass = m.WHITE_PAINT.draw(rng), m.GLASS.draw(rng)
     if lit and rng.random() < 0.3:
+        # W m-2 sr-1; assumed. LED light has little in band, halogen and candles have more.
         glass = glass.glowing(m.log_uniform(rng, (5e-4, 5e-3)))
     half, top = 0.52, sill_m + 1.35
     panes = [(y - half + 0.07, y - 0.03), (y + 0.03, y + half - 0.07)]

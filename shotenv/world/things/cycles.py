@@ -15,6 +15,7 @@ def bicycle(rng: np.random.Generator) -> Mesh:
     metal, tyre, glint = m.DARK_METAL.draw(rng), m.TYRE.draw(rng), m.RETRO_SHEET.draw(rng)
     hub_rear, hub_front, crank = (-0.5, 0.0, 0.35), (0.52, 0.0, 0.35), (-0.05, 0.0, 0.30)
     saddle, handle = (-0.2, 0.0, 0.92), (0.38, 0.0, 0.98)
+    # The tubes of a diamond frame, the fork, and the handle bar across.
     joints = [(hub_rear, crank), (hub_rear, saddle), (crank, saddle), (crank, handle)]
     joints += [(saddle, handle), (handle, hub_front), ((0.38, -0.25, 1.0), (0.38, 0.25, 1.0))]
     frame = [meshes.rod(a, b, 0.025, metal, sections=4) for a, b in joints]
@@ -41,6 +42,7 @@ def motorcycle(
     lamp, glow = m.LENS.draw(rng), (headlight_radiance, tail_radiance)
     tank = [(-0.1, 0.72), (0.42, 0.70), (0.46, 0.88), (0.1, 0.98), (-0.1, 0.85)]
     seat = [(-0.85, 0.78), (-0.1, 0.68), (-0.1, 0.80), (-0.85, 0.92)]
+    # Wheels and their discs, engine, tank, seat, fork, handle bar, lamp housing, lamps, plate.
     machine = meshes.join(
         [
             *(hoop(hub, 0.26, tyre, thickness=0.06) for hub in hubs),

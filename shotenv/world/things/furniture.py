@@ -7,6 +7,7 @@ import numpy as np
 from shotenv.world.geometry import Mesh, materials as m, meshes
 
 LAMP_HEAD_M = (0.5, 0.22)
+"""Length and width of the glowing face of a street lamp."""
 
 
 @meshes.thing
@@ -46,11 +47,13 @@ def sign(rng: np.random.Generator) -> Mesh:
     size, z = rng.uniform(0.3, 0.42), rng.uniform(1.9, 2.4)
     sides, turn = ((10, 0.0), (3, np.pi / 2), (4, 0.0), (4, np.pi / 4))[rng.integers(4)]
     outline = regular_polygon(sides, size, turn)
+    # Face, symbol and the symbol's inside: share of the size, each 6 mm before what it covers.
     plates = [(1.0, 0.050, sheet), (0.55, 0.056, paint), (0.30, 0.062, sheet)]
     faces = [
         meshes.polygon([(x, share * y, z + share * h) for y, h in outline], material)
         for share, x, material in plates
     ]
+    # Turned round, since faces are described from their front; no sign reflects from behind.
     rear = meshes.polygon([(0.045, y, z + h) for y, h in outline[::-1]], metal)
     return meshes.join([meshes.rod((0, 0, 0), (0, 0, z + size), 0.035, metal), rear, *faces])
 

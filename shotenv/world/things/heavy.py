@@ -19,6 +19,7 @@ def lorry(
     load_length = length - 2.0
     middle = rear + load_length / 2
     radius = rng.uniform(0.40, 0.48)
+    # Long ones carry their load on two axles at the rear.
     axles = (front - 0.8, rear + 1.3) if length < 7.0 else (front - 0.8, rear + 1.1, rear + 2.2)
     return meshes.join(
         [
@@ -72,6 +73,7 @@ def lorry_tail(
     """Contour tape, under-run bar, tail lamps and number plate."""
     tape, lamp, x = m.RETRO_SHEET.draw(rng), m.LENS.draw(rng).glowing(radiance), rear - 0.012
     half = width / 2 - 0.03
+    # Contour marking along all four edges, as on real lorries (UN Regulation 104).
     edges = [((-half, half), (1.1, 1.16)), ((-half, half), (height - 0.1, height - 0.04))]
     edges += [((y, y + 0.06), (1.17, height - 0.11)) for y in (-half, half - 0.06)]
     spans = [(-half, -half + 0.4), (half - 0.4, half)]

@@ -70,6 +70,7 @@ def figure(
         head(rng, (0.02, 0.0, 1.62)),
     ]
     if rng.random() < 0.25:
+        # A rucksack.
         parts.append(meshes.box((0.12, 0.34, 0.4), clothes(rng), (-0.2, 0.0, 1.0)))
     return meshes.scaled(meshes.join(parts), (scale, scale * rng.uniform(0.95, 1.12), scale))
 
@@ -82,6 +83,7 @@ def legs(rng: np.random.Generator, stride_m: float, phase_rad: float) -> Mesh:
         foot, y = side * stride_m / 2 * np.cos(phase_rad), side * 0.10
         # Feet are farthest apart at phase 0; where they pass each other, one of them is up.
         lift = 0.25 * stride_m * max(0.0, side * np.sin(phase_rad))
+        # A lifted foot bends the knee forwards.
         knee = foot / 2 + 0.03 + 0.8 * lift
         parts += [
             meshes.rod((knee, y, 0.44 + lift), (0.0, y, 0.86), 0.085, trousers, sections=6),
@@ -116,6 +118,7 @@ def arms(rng: np.random.Generator, stride_m: float, reach_m: float = 0.0) -> Mes
     sleeve, skin = clothes(rng), m.SKIN.draw(rng)
     parts = []
     for side in (-1, 1):
+        # Each arm swings with the leg of the other side, less far.
         swing, y = -side * stride_m / 3, side * 0.28
         elbow, hand = (swing / 2 - 0.03, y, 1.12), (swing + 0.04, y, 0.86)
         if reach_m:
@@ -163,6 +166,7 @@ def umbrella(rng: np.random.Generator, speed_m_s: float = 0.0) -> Mesh:
     """Somebody under an open umbrella."""
     canopy = [(0.02, 0.22), (0.30, 0.16), (0.55, 0.0)]
     cloth, metal = clothes(rng), m.METAL.draw(rng)
+    # The profile runs from the rim up to the tip, as `lathe` wants it.
     cover = meshes.lathe(canopy[::-1], cloth, (0.12, 0.1, 1.86))
     stick = meshes.rod((0.2, 0.15, 1.05), (0.12, 0.1, 2.05), 0.012, metal, sections=4)
     return meshes.join([adult(rng, STRIDE_S * speed_m_s, reach_m=0.2), cover, stick])
@@ -197,6 +201,7 @@ def dog(rng: np.random.Generator) -> Mesh:
     """A dog of any size."""
     coat = m.Finish((0.10, 0.60), 0.3, 0.3).draw(rng)
     legs_at = [(x, y) for x in (-0.22, 0.2) for y in (-0.07, 0.07)]
+    # Trunk, legs, neck, head with muzzle, tail.
     body = meshes.join(
         [
             meshes.rod((-0.28, 0.0, 0.48), (0.26, 0.0, 0.50), 0.12, coat, sections=7),
@@ -223,6 +228,7 @@ def seated_rider(rng: np.random.Generator, turn_rad: float = 0.5 * np.pi) -> Mes
     trousers, jacket, shoe = clothes(rng), clothes(rng), m.LEATHER.draw(rng)
     parts = [meshes.rod((-0.2, 0.0, 0.95), (0.08, 0.0, 1.42), 0.16, jacket, sections=8)]
     for side in (-1, 1):
+        # Cranks of 16 cm about the bottom bracket; the pedals are half a turn apart.
         pedal_x = -0.05 + 0.16 * side * np.cos(turn_rad)
         pedal_z = 0.30 + 0.16 * side * np.sin(turn_rad)
         hip, knee = (-0.17, side * 0.1, 0.95), (0.2, side * 0.12, pedal_z + 0.45)

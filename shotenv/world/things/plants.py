@@ -43,7 +43,7 @@ def conifer(rng: np.random.Generator) -> Mesh:
     """A stem under stacked cones."""
     bark, needles = m.BARK.draw(rng), m.FOLIAGE.draw(rng)
     height, width = rng.uniform(3.5, 7.0), rng.uniform(0.9, 1.6)
-    levels = np.linspace(0.15, 0.7, 4)
+    levels = np.linspace(0.15, 0.7, 4)  # Where tiers of branches start, as shares of the height.
     cones = [
         meshes.lathe(
             [(0, z * height), (width * (1 - z), z * height), (0, (z + 0.3) * height)], needles

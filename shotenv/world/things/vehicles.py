@@ -128,6 +128,7 @@ def outlines(shape: CarShape, rear_share: float = 0.5) -> list[list[meshes.Point
     """Where the cabin has windows: wind screen, rear window, front and rear panes of each side."""
     rear, nose, front_roof, rear_roof = shape.cabin
     half = shape.cabin_width / 2
+    # The post between front and rear panes stands at this share of the way from the rear.
     low, high = _between(rear, nose, rear_share), _between(rear_roof, front_roof, rear_share)
     sides = [(low, nose, front_roof, high), (rear, low, high, rear_roof)]
     right = [[(x, -half, z) for x, z in side] for side in sides]
@@ -176,6 +177,7 @@ def _between(a: tuple[float, float], b: tuple[float, float], share: float) -> tu
 def wheels(rng: np.random.Generator, shape: CarShape) -> Mesh:
     """Four tyres with bright rims."""
     tyre, rim = m.TYRE.draw(rng), m.METAL.draw(rng)
+    # A wheelbase of 58 % of the length is usual.
     radius, axle = shape.wheel_radius, 0.29 * shape.length
     return meshes.join(
         wheel(x, side, shape.width / 2, radius, tyre, rim)
@@ -188,7 +190,7 @@ def front_trim(rng: np.random.Generator, shape: CarShape, radiance: float) -> Me
     """Head lamps, grille and number plate, a little before the body so that they are seen."""
     x, half = shape.length / 2 + 0.012, shape.width / 2
     lamp = m.LENS.draw(rng).glowing(radiance)
-    high = shape.body[4][1]
+    high = shape.body[4][1]  # The bonnet's front edge, under which the lamps are.
     spans = [(-half + 0.06, -half + 0.42), (half - 0.42, half - 0.06)]
     lamps = [meshes.front(y, (high - 0.16, high - 0.02), x, lamp) for y in spans]
     grille = meshes.front(

@@ -18,6 +18,7 @@ def wheel(x: float, side: int, half: float, radius: float, tyre: Material, rim: 
         (x + 0.62 * radius * np.cos(a), outer + side * 0.008, radius + 0.62 * radius * np.sin(a))
         for a in turns
     ]
+    # A tyre of ten sections need not have a corner at its lowest point, and would float.
     rubber = meshes.rod((x, inner, radius), (x, outer, radius), radius, tyre, sections=10)
     return meshes.join([meshes.grounded(rubber), meshes.polygon(disc, rim)])
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import shutil
+
 import gymnasium
 import numpy as np
 import pytest
@@ -48,6 +51,17 @@ def test_a_step_tells_what_it_cost(tiny_kwargs):
         assert reward == pytest.approx(-np.dot(expected, [terms[name] for name in TERMS]))
         assert info["vector_reward"] in env.unwrapped.reward_space
         assert np.allclose(info["vector_reward"], [terms[name] for name in TERMS])
+
+
+def test_a_film_plays_in_real_time(tiny_kwargs, tiny_bank, tmp_path):
+    slow = shutil.copytree(tiny_bank, tmp_path / "slow")
+    manifest = json.loads((slow / "manifest.json").read_text())
+    manifest["config"]["world"]["frame_rate_hz"] = 4.0
+    (slow / "manifest.json").write_text(json.dumps(manifest))
+    changes = {"bank": str(slow), "frame_rate_hz": 4.0}
+    assert make(tiny_kwargs, **changes).metadata["render_fps"] == 4
+    assert make_vec(tiny_kwargs, **changes).metadata["render_fps"] == 4
+    assert make(tiny_kwargs).metadata["render_fps"] == 10
 
 
 def test_a_drive_is_truncated_and_then_wants_a_reset(tiny_kwargs):
