@@ -48,6 +48,7 @@ def build_bank(
     """
     folder = bank_folder(config) if folder is None else Path(folder)
     jobs = clip_jobs(config, folder)
+    # Without the lock, which a folder that can only be read would not give.
     finished = (folder / MANIFEST).is_file() and was_rendered_from(folder, config)
     if finished and all(job.stands for job in jobs):
         return folder
@@ -60,6 +61,7 @@ def build_bank(
         ) from None
     with FileLock(folder / ".lock"):
         _claim(folder, config)
+        # Only now, under the lock: another process may have rendered them meanwhile.
         missing = [job for job in jobs if read_clip_record(job.folder) is None]
         _announce(config, folder, len(jobs), len(missing))
         _render(missing, config, workers or available_cores())
@@ -110,6 +112,7 @@ def _render(jobs: Sequence[ClipJob], config: BankConfig, workers: int) -> None:
 
     frames = config.world.frames_per_clip
     with progress(len(jobs) * frames, "rendering", "frame") as bar:
+        # A clip of more frames than that still has to be one worker's.
         jobs_per_worker = max(1, FRAMES_PER_WORKER // frames)
         for _ in run_jobs(render_clip, jobs, workers=workers, jobs_per_worker=jobs_per_worker):
             bar.update(frames)

@@ -104,6 +104,7 @@ def maps_of(bank: Bank, index: int) -> dict[str, np.ndarray]:
     lit = first.amplitude > 0
     wrapped_m = torch.where(lit, distance_m(first.phase_rad, sensor.f1_hz), torch.nan)
     return {
+        # Dark scenes would be black without the gamma, as in `env.picture`.
         "gray image": (frame.gray.numpy() / full_scale_lsb(sensor.adc_bits)) ** 0.5,
         "distance": frame.exposure.distance_m[0].numpy(),
         "wrapped distance": wrapped_m.numpy(),

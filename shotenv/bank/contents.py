@@ -70,6 +70,7 @@ def contents_of(bank: Bank) -> dict[str, Any]:
         "clips": len(bank.clips),
         "width": bank.width,
         "height": bank.height,
+        # Without headers and records, which are less than a thousandth of it.
         "bytes": len(bank) * frame_bytes(bank.height, bank.width),
         "splits": splits,
         "config": None if bank.config is None else bank.config.model_dump(mode="json"),

@@ -27,6 +27,7 @@ def open_bank(bank: str | Path, *, render: bool = True) -> Bank:
     BankError
         Neither a bank nor a configuration, or a damaged bank; the message names file and cure.
     """
+    # A folder first: who names a path means what lies there, not a configuration of that name.
     if Path(bank).is_dir() and (Path(bank) / MANIFEST).is_file():
         return Bank(Path(bank))
     try:

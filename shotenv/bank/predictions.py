@@ -113,6 +113,7 @@ def _predict_all(bank: Bank, unwrapper: Unwrapper) -> tuple[np.ndarray, np.ndarr
     distance_m, confidence = np.empty(shape, np.float16), np.empty(shape, np.float16)
     with progress(len(bank), f"{unwrapper.name} predicts", "frame") as bar:
         for index in range(len(bank)):
+            # One by one: a frame is predicted alike whatever the bank around it.
             prediction = unwrapper.predict(bank.gray(torch.tensor([index])))
             distance_m[index] = prediction.distance_m[0].numpy()
             confidence[index] = prediction.confidence[0].numpy()

@@ -196,6 +196,7 @@ def _cure(path: Path) -> str:
 
 def _check_header(path: Path, clip: ClipRecord, spec: ArraySpec, manifest: Manifest) -> None:
     """Refuse an array file whose header or length is not what the manifest says."""
+    # The length counts, too: a mapped file that is too short ends the process (SIGBUS) when read.
     shape = (clip.frames, *spec.channels, manifest.height, manifest.width)
     expected = int(np.prod(shape)) * np.dtype(spec.dtype).itemsize
     try:

@@ -67,6 +67,7 @@ class BankConfig(Section):
                 "train_clips, validation_clips, test_clips and shift_clips are all 0; expected "
                 "at least one clip"
             )
+        # Clips of a family in two splits would let what is held out be learnt.
         held_out = sorted(set(self.world.families) & set(SHIFT_FAMILIES))
         if self.shift_clips and held_out:
             raise ValueError(

@@ -34,6 +34,7 @@ class EnvConfig(Section):
         "train", description="clips that drives are made of; all: those of no held-out family"
     )
     unwrapper: str = Field("tofregnet", description="name or path of an unwrapping network")
+    # The words of `unwrap.depth.Merge`, which would bring torch along; a test compares them.
     merge: Literal["nearest", "floor", "none"] = Field(
         "nearest",
         description="how prediction and wrapped map merge: ours, eq. 6, or the prediction alone",

@@ -42,6 +42,7 @@ def env_config(config: str = "default", **fields: Any) -> EnvConfig:
     >>> env_config(reward={"power": 0.2}).reward.power
     0.2
     """
+    # A named file replaces the whole section, a mapping changes single values of the base's.
     base = _read(EnvConfig, "env", "config", config)
     changes = dict(fields)
     for name, model in SECTIONS.items():

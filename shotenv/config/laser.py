@@ -55,6 +55,7 @@ class LaserConfig(Section):
         check_range("ambient_k", self.ambient_k)
         if self.optical_power_w[0] <= 0:
             raise ValueError(f"optical_power_w is {self.optical_power_w}; expected above 0 W")
+        # A laser that trips at an ambient above its release would never come back.
         if not self.ambient_k[1] < self.release_k < self.trip_k:
             raise ValueError(
                 f"release_k is {self.release_k:g}; expected above the hottest ambient_k "

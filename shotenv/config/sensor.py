@@ -136,6 +136,7 @@ class SensorConfig(Section):
                 f"saturation_range_m is {self.saturation_range_m:g}; expected at most the "
                 f"unambiguous range {wrap_m:.4g} m of f1_hz = {self.f1_hz:g}"
             )
+        # Beyond the joint range two frequencies are as ambiguous as one is beyond its own.
         joint_m = joint_range_m(self.f1_hz, self.f2_hz)
         if self.max_range_m > joint_m:
             raise ValueError(

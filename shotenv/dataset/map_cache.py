@@ -57,6 +57,7 @@ class MapCache(Generic[Value]):
             if arguments not in self._values:
                 self._values[arguments] = value
                 self.nbytes += nbytes_of(value)
+            # Down to nothing where a single value is larger than all the room.
             while self.nbytes > self._largest_bytes:
                 _, oldest = self._values.popitem(last=False)
                 self.nbytes -= nbytes_of(oldest)

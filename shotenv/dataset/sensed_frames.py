@@ -119,6 +119,7 @@ class SensedFrames:
         """Whether the frame at `number` comes right after the one at `number - 1`, in a clip."""
         index = int(self.frames[number])
         starts = self.bank.clip_of(index).start == index
+        # Frames of a split need not be neighbours in the bank.
         return number > 0 and not starts and int(self.frames[number - 1]) == index - 1
 
     def warp(self, distance_m: Tensor, numbers: Sequence[int]) -> Memory:
@@ -139,6 +140,7 @@ class SensedFrames:
         )
 
     def _thinned(self, maps: Tensor) -> Tensor:
+        # Contiguous, as compiled loops want it; a view would be copied in each of them.
         return maps[..., :: self.stride, :: self.stride].contiguous()
 
     def _exposure(self, frames: Tensor) -> Exposure:

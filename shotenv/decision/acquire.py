@@ -49,6 +49,7 @@ def noise_of(drive: Drive, step: Tensor, height: int, width: int) -> Iterator[Te
 
     Each drive has its own stream.
     """
+    # By the step and not the bank frame: a clip that comes twice in a drive is noisy anew.
     return noise_samples(drive.seed.tolist(), step.tolist(), height, width)
 
 
@@ -80,6 +81,7 @@ def acquire_depth(
         light = incident_light(exposure, sensitivity(sensor, power_w, drive.integration_s))
     scored = scored_pixels(undiminished, exposure.distance_m, sensor)
     raw = acquire(light, sensor, shots=shots, noise=noise, offsets=drive.offsets)
+    # As the sensor itself expects it, from its gray image: the same for any number of samples.
     noise_lsb = sample_noise_lsb(
         gray, problem.gray_exposure_s.take(frames), drive.integration_s, sensor
     )

@@ -144,6 +144,7 @@ def chain_clips(clips: Sequence[Clip], length: int, *, generator: torch.Generato
         same_family = [clip for clip in others if last and clip.family == last.family]
         pool = same_family if same_family and stays < FAMILY_STAYS else others
         last = pool[int(choice * len(pool))]
+        # The last clip is cut off where the drive ends.
         frames.extend(range(last.start, last.start + last.frames))
     return torch.tensor(frames[:length])
 

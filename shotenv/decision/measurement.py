@@ -54,6 +54,7 @@ def measure_frames(
 ) -> Measurement:
     """Acquire, correct and score the frames at `step` [B] of `drive`; see `acquire_depth`."""
     acquisition = acquire_depth(problem, drive, step, shots, power_w, noise=noise)
+    # Over the pixels that the drive's own laser would light enough, whatever was emitted now.
     score = score_depth(
         acquisition.depth.distance_m,
         acquisition.depth.valid,

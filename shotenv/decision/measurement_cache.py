@@ -65,6 +65,7 @@ class MeasurementCache:
             measured = measure_frames(problem, take(drive, rows), step[rows], shots)
             new = {keys[i]: row for i, row in zip(missing, _to_rows(measured), strict=True)}
         found = _from_rows([new.get(key) or self._rows[key] for key in keys])
+        # All of a batch or none of it: which drives are kept does not depend on their order in it.
         if len(self._rows) + len(new) <= self.most_kept:
             self._rows |= new
         return found

@@ -23,6 +23,7 @@ def reward_terms(
     return {
         "error": score.error,
         "duty": cost.duty / always_eight.duty,
+        # Whole energies, chips and networks too; the period cancels in the ratio of powers.
         "power": cost.energy_j / always_eight.energy_j,
         "tripped": tripped.to(torch.float64),
     }

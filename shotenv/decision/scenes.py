@@ -70,6 +70,7 @@ def look_at_scenes(
 def log_ambient_of(gray: Tensor, exposure_s: Tensor, sensor: SensorConfig) -> Tensor:
     """Log10 of the ambient radiance on a coarse grid, [B, GRID * GRID], W m-2 sr-1."""
     full_scale_e = full_scale_lsb(sensor.adc_bits) / gray_gain_lsb_per_e(sensor)
+    # Radiance of a full-scale pixel, inverting the camera equation and the exposure time.
     scale = full_scale_e / (electrons_per_radiance_second(sensor) * exposure_s)
     # Averaged before the logarithm, which would turn noise in the dark into large changes.
     coarse = torch.nn.functional.adaptive_avg_pool2d(gray.unsqueeze(1), GRID).flatten(1)

@@ -44,6 +44,7 @@ class Seen:
     @classmethod
     def nothing(cls, batch: int) -> Seen:
         """What is known before the first frame of `batch` drives."""
+        # Zeros, as after a frame without laser: neither has told anything.
         none, zero = torch.zeros(batch, dtype=torch.int64), torch.zeros(batch, dtype=torch.float64)
         never = torch.full((batch,), NEVER)
         return cls(torch.zeros(batch, len(SEEN_FEATURES)), none, never, never, zero, zero)

@@ -101,6 +101,7 @@ def step(
     terms = reward_terms(measured.score, cost, drive.always_eight, laser.tripped)
 
     # All that the next frame will know of this one: its heat, and what was seen.
+    # Heat of this frame acts from the next one on; within it the laser is as warm as at its start.
     warmed = laser_step(laser, cost, drive.ambient_k, config.laser, period_s)
     seen = state.seen.after(shots, measured.features, terms["duty"], terms["power"], period_s)
     following = State(drive, state.step + 1, warmed, seen)

@@ -36,6 +36,7 @@ def step_infos(
     the order of `TERMS`.
     """
     cost, score, laser = outcome.cost, outcome.score, problem.config.laser
+    # Light is judged after the frame, since it is what the frame has added that may exceed the cap.
     violated = outcome.tripped | too_bright(after.laser, laser)
     columns = {
         "shots": outcome.shots.tolist(),

@@ -48,6 +48,7 @@ def frame_panels(problem: Problem, state: State, shots: int) -> dict[str, Image.
     frame = drive.frame(state.step)
     gray = problem.bank.gray(frame)[0].to(torch.float32) / full_scale_lsb(sensor.adc_bits)
     truth_m = problem.bank.exposure(frame).distance_m[0]
+    # What is beyond the scored range stays black, like the sky; its error would not count.
     near_m = torch.where(truth_m <= sensor.max_range_m, truth_m, torch.nan)
     nothing = torch.full_like(truth_m, torch.nan)
     wrapped_m, corrected_m, error_m = nothing, nothing, nothing

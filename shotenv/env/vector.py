@@ -104,6 +104,7 @@ class ShotScheduleVectorEnv(VectorEnv):
         """
         rows = np.flatnonzero(self._check_reset_mask(options))
         for row, value in enumerate(self._check_seeds(seed)):
+            # A row that goes on with its drive leaves its seed unused: its next drive stays the same.
             if value is not None and row in rows:
                 self._generators[row] = seeding.np_random(value)[0]
         infos = self._restart(rows)
@@ -137,6 +138,7 @@ class ShotScheduleVectorEnv(VectorEnv):
             for row in np.flatnonzero(truncated).tolist():
                 infos[row] = {"final_obs": last[row], "final_info": infos[row]}
         for row, info in self._restart(np.flatnonzero(restarted)).items():
+            # In SameStep beside the final ones; in NextStep the row has not played, and has none.
             infos[row] = infos.get(row, {}) | info
         none = np.zeros(self.num_envs, dtype=bool)
         return self._observations(), rewards, none, truncated, self._batched(infos)

@@ -85,6 +85,7 @@ class FrameRenderer:
             correlation=traced.correlation[laser],
             active=traced.active[laser].mean(axis=0),
             ambient=traced.ambient[passive].mean(axis=0),
+            # Of the first sample, the instant that the frame is asked for.
             distance_m=traced.distance_m[0],
         )
 

@@ -166,6 +166,7 @@ def _normal(first, second, third):
     bx, by, bz = third[0] - first[0], third[1] - first[1], third[2] - first[2]
     x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     length = np.sqrt(x * x + y * y + z * z)
+    # A face without area, such as `_nothing`'s, is never hit, but NaN would spread in its lane.
     scale = length if length > 0.0 else 1.0
     return x / scale, y / scale, z / scale
 

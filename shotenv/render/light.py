@@ -176,6 +176,7 @@ class _Opening:
         """Direction to a point of the opening drawn evenly, and the solid angle it stands for."""
         target = self._from + self._size * mi.Vector3f(0, sample.x, sample.y)
         away = target - point
+        # Points in the opening itself would divide by zero.
         square = dr.maximum(dr.squared_norm(away), 1e-6)
         direction = away * dr.rsqrt(square)
         return direction, self._area * dr.maximum(direction.x, 0) / square
@@ -205,6 +206,7 @@ def lamp_table(world: World, time_s: float) -> np.ndarray:
 
     Lamps that ride with the camera or are carried have moved rigidly with it since time 0.
     """
+    # Rows of lamps that are not there stay 0; the loop over lamps stops before them.
     table = np.zeros((MAX_LAMPS, _LAMP_NUMBERS), np.float32)
     for row, lamp in zip(table, world.light.lamps, strict=False):
         turn, position = _lamp_pose(world, lamp, time_s)

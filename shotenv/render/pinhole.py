@@ -64,6 +64,7 @@ class Pinhole:
         ahead, leftward, upward = self._axes_at(instant)
         across, down = half_extents(self._camera)
         depth = -dr.dot(direction, ahead)
+        # Behind the camera `depth` is negative, and nothing is inside.
         inside = (dr.abs(dr.dot(direction, leftward)) <= across * depth) & (
             dr.abs(dr.dot(direction, upward)) <= down * depth
         )

@@ -56,6 +56,7 @@ def expose(
     shots = Shots(shots)
     check_exposure(exposure, shots)
     check_settings(exposure, shots, laser_power_w, integration_s, noise)
+    # `acquire` takes noise sample by sample, as the streams draw it.
     samples = None if noise is None else noise.unbind(1)
     light = incident_light(exposure, sensitivity(sensor, laser_power_w, integration_s))
     return acquire(light, sensor, shots=shots, noise=samples, offsets=offsets)
@@ -130,6 +131,7 @@ def scored_pixels(light: IncidentLight, truth_m: Tensor, sensor: SensorConfig) -
     if truth_m.shape != light.active.shape:
         raise ValueError(f"truth_m is {tuple(truth_m.shape)}; expected {light.active.shape}")
     scored = np.empty(light.active.shape, np.bool_)
+    # float32, as everything in the loops; see `unwrap.support.loop`.
     limits = np.float32(sensor.max_range_m), np.float32(sensor.min_snr)
     mark_scored_(light, pixel_of(sensor), array(truth_m), *limits, scored)
     return torch.from_numpy(scored)

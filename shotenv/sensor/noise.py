@@ -59,6 +59,7 @@ def noise_samples(
     """
     streams = [stream(Purpose.NOISE, *words) for words in zip(seeds, frames, strict=True)]
     while True:
+        # A new tensor each time: whoever keeps a sample must not see the next one written over it.
         normals = torch.empty(len(streams), 2, height, width)
         for one, generator in zip(normals, streams, strict=True):
             one.normal_(generator=generator)

@@ -6,10 +6,10 @@ import math
 
 import pytest
 import torch
+from acquisitions import INTEGRATION_S, POWER_W, acquired
 
 from shotenv.config.reader import find_config, merged, read_config
 from shotenv.config.sensor import SensorConfig
-from shotenv.sensor.acquisition import expose
 from shotenv.sensor.description import description_of
 from shotenv.sensor.drift import imager_temperature_k, residual_drift_m
 from shotenv.sensor.electrons import electrons_per_radiance_second
@@ -24,7 +24,7 @@ from unwrap.signal.shots import Shots, demodulation_phase_rad, frequency_index, 
 from unwrap.signal.wiggle import WiggleTable, wiggle_of
 
 C_M_S = 299_792_458.0
-POWER_W, INTEGRATION_S, AMBIENT_K = 7.0, 6e-4, 306.15
+AMBIENT_K = 306.15
 FINE = {
     "gain_lsb_per_e": 0.2,
     "adc_bits": 16,
@@ -49,19 +49,6 @@ def scene(sensor, distance, active, ambient) -> Exposure:
         samples.append(active * sum(w * torch.cos(h * angle) for h, w in weights))
     correlation = torch.stack(samples).float()
     return Exposure(correlation[None], active[None], ambient[None], distance[None])
-
-
-def acquired(exposure, sensor, shots, *, noise=None, offsets=None):
-    one = torch.ones(1, dtype=torch.float64)
-    return expose(
-        exposure,
-        sensor,
-        shots=shots,
-        laser_power_w=POWER_W * one,
-        integration_s=INTEGRATION_S * one,
-        noise=noise,
-        offsets=offsets,
-    )
 
 
 def errors_m(sensor, distance, *, shift_m=None) -> dict[Shots, torch.Tensor]:

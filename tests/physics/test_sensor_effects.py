@@ -6,32 +6,18 @@ import math
 
 import pytest
 import torch
+from acquisitions import INTEGRATION_S, POWER_W, acquired
 
 from shotenv.config.reader import merged
-from shotenv.sensor.acquisition import expose
 from shotenv.sensor.drift import distance_drift_m, imager_temperature_k, residual_drift_m
 from shotenv.sensor.electrons import electrons_per_radiance_second
 from shotenv.sensor.exposure import Exposure
 from shotenv.sensor.gray import capture_gray
 from shotenv.sensor.noise import Purpose, draw_noise, stream
 from shotenv.sensor.offsets import OffsetPattern, draw_offsets
-from unwrap.signal.shots import Shots, demodulation_phase_rad
+from unwrap.signal.shots import demodulation_phase_rad
 
-POWER_W, INTEGRATION_S = 7.0, 6e-4
 LIGHT_LEVELS = [10.0 ** (-3.0 + 0.25 * i) for i in range(10)]
-
-
-def acquired(exposure, sensor, *, noise=None, offsets=None, shots=Shots.FOUR):
-    one = torch.ones(1, dtype=torch.float64)
-    return expose(
-        exposure,
-        sensor,
-        shots=shots,
-        laser_power_w=POWER_W * one,
-        integration_s=INTEGRATION_S * one,
-        noise=noise,
-        offsets=offsets,
-    )
 
 
 def at_phase_zero(radiance, shape, *, ambient=0.0) -> Exposure:

@@ -19,6 +19,7 @@ from shotenv.sensor.exposure import Exposure
 from shotenv.sensor.noise import draw_noise
 from unwrap.signal.decoding import decode
 from unwrap.signal.shots import Shots
+from unwrap.support.process_state import torch_threads
 
 STEPS = 500
 PROGRAM = """
@@ -117,12 +118,11 @@ def test_large_frames_do_not_depend_on_threads_or_batch(sensor):
         phase = decode(raw.dcs_lsb)
         return raw.dcs_lsb, phase.phase_rad, phase.amplitude
 
-    threads, results = torch.get_num_threads(), []
+    results = []
     for count in (1, 2):
-        torch.set_num_threads(count)
-        results.append(found(slice(0, 3)))
-        singles = [found(slice(row, row + 1)) for row in range(3)]
+        with torch_threads(count):
+            results.append(found(slice(0, 3)))
+            singles = [found(slice(row, row + 1)) for row in range(3)]
         results.append(tuple(torch.cat(parts) for parts in zip(*singles, strict=True)))
-    torch.set_num_threads(threads)
     for result in results[1:]:
         assert all(torch.equal(a, b) for a, b in zip(results[0], result, strict=True))

@@ -28,6 +28,7 @@ def lay_out_construction_site(site: Site, rng: np.random.Generator) -> None:
         put_blockage(site, rng)
     put_machines(site, rng, half)
     put_crew(site, rng, half)
+    # The building stands on one side of the road, and the fence on the other.
     side = rng.choice([-1, 1])
     inwards = -side * np.pi / 2
     put_row(site, rng, lambda r: unfinished_wall(r, 6.0), side * (half + 4.5), 6.3, inwards)
@@ -81,6 +82,7 @@ def passing_worker(rng: np.random.Generator, wetness: float = 0.0) -> tuple[Mesh
 def put_flood_light(site: Site, rng: np.random.Generator, half: float) -> None:
     """A mast with lamps that look down the road; lit at night."""
     height = rng.uniform(3.5, 5.5)
+    # It shines obliquely along the road, so that what it lights is further off than its height.
     intensity = lights.intensity_for(rng, FLOOD_IRRADIANCE, 2 * height) if site.night else 0.0
     x, side = site.travel_m + rng.uniform(4.0, 12.0), rng.choice([-1, 1])
     mesh = light_tower(rng, height, lights.face_radiance(intensity, 0.24))
@@ -104,6 +106,7 @@ def worker(rng: np.random.Generator, stride_m: float = 0.0) -> Mesh:
     trunk = [(0.0, 0.0), (0.18, 0.0), (0.17, 0.15), (0.22, 0.5), (0.19, 0.62), (0.0, 0.70)]
     hoops = [[(0.188, 0.20), (0.196, 0.26)], [(0.213, 0.36), (0.221, 0.42)]]
     body = [meshes.lathe(trunk, vest, sections=10)]
+    # A few millimetres off the vest, and pressed flat along with it.
     body += [meshes.lathe(hoop, tape, sections=10) for hoop in hoops]
     upright = meshes.at(meshes.scaled(meshes.join(body), (0.62, 1.0, 1.0)), 0.0, 0.0, 0.80)
     parts = [
@@ -121,6 +124,7 @@ def excavator(rng: np.random.Generator) -> Mesh:
     paint, dark, glass = m.MACHINE_PAINT.draw(rng), m.DARK_METAL.draw(rng), m.GLASS.draw(rng)
     reach, lift, scale = rng.uniform(0.6, 1.0), rng.uniform(0.0, 0.8), rng.uniform(0.6, 1.0)
     track = [(-1.5, 0.3), (-1.2, 0.0), (1.2, 0.0), (1.5, 0.3), (1.4, 0.7), (-1.4, 0.7)]
+    # Joints of the boom in the plane of symmetry, (x, z) before all is scaled.
     elbow = (2.0 + 1.2 * reach, 3.0 + lift)
     wrist = (elbow[0] + 1.0 * reach, 1.0 + lift)
     bucket = [(-0.5, 0.05), (0.1, 0.0), (0.35, 0.5), (0.1, 0.85)]
@@ -148,6 +152,7 @@ def dumper(rng: np.random.Generator) -> Mesh:
     skip = [(0.2, 0.85), (1.3, 0.85), (1.75, 1.55), (0.0, 1.55)]
     return meshes.join(
         [
+            # Skip, frame, engine, wheels, roll bar, driver.
             meshes.extrude(skip, 1.7, paint),
             meshes.box((2.6, 0.9, 0.35), dark, (0.0, 0.0, 0.5)),
             meshes.box((1.0, 1.2, 0.6), paint, (-1.0, 0.0, 0.86)),

@@ -83,6 +83,7 @@ def build_garage_shell(
     """Floor, ceiling with beams and a pipe, side walls, an end wall that may have an opening."""
     start, wall = -10.0, buildings.wall_material(rng)
     concrete = m.CONCRETE.draw(rng)
+    # Coated floors mirror lamps and cars, bare concrete does not.
     floor = (m.CONCRETE if rng.random() < 0.5 else m.COATED_FLOOR).draw(rng)
     site.build(meshes.patch((start, end), (-half, half), 0.0, floor))
     size = (end - start + 2.0, 2 * half + 2.0, SLAB_M)
@@ -138,9 +139,11 @@ def build_ramp(
     site: Site, rng: np.random.Generator, foot: float, width: float, rise: float, wall: m.Material
 ) -> None:
     """A way up to the street between two walls, with ribs across it; at its top stand trees."""
+    # Slopes of 13 to 20 %, as ramps of garages have them.
     length, half = rise / rng.uniform(0.13, 0.20), width / 2
     head, concrete = foot + length, m.CONCRETE.draw(rng)
     slope = [(foot, -half, 0.0), (head, -half, rise), (head, half, rise), (foot, half, 0.0)]
+    # Marked by hand as a kind of thing: it is no function of its own that `@thing` could mark.
     site.build(replace(meshes.polygon(slope, concrete), kinds=frozenset({"ramp"})))
     rib = m.DARK_METAL.draw(rng)
     for share in np.arange(0.02, 1.0, 0.45 / length):

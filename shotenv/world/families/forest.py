@@ -27,6 +27,7 @@ def lay_out_forest_path(site: Site, rng: np.random.Generator) -> None:
         path = Motion(Pose((x, 0.4 * half, 0.004), np.pi), speed)
         site.put_moving(cycles.cyclist(rng), path)
     put_deer(site, rng, half)
+    # The further off, the sparser and the coarser: what is behind is mostly hidden.
     for side in (-1, 1):
         edge = side * (half + 0.5)
         put_row(site, rng, undergrowth, edge + 0.2 * side, 1.7, 0.0, share=0.7, spread=0.4)

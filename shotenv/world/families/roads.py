@@ -34,6 +34,7 @@ PUDDLE_M = 0.013
 def lay_out_country_road(site: Site, rng: np.random.Generator) -> None:
     """Two lanes, verges, trees, signs, guard rails, traffic."""
     lane, far = rng.uniform(3.0, 3.75), site.travel_m + REACH_M
+    # Traffic drives on the right: the other lane is to the left, that is towards +y.
     right, left = -lane / 2 - 0.4, 1.5 * lane + 0.4
     build_carriageway(site, rng, right, left, lane)
     verge = (m.GRASS if rng.random() < 0.7 else m.SOIL).draw(rng)
@@ -62,6 +63,7 @@ def lay_out_town_street(site: Site, rng: np.random.Generator) -> None:
     """A street between facades with pavements, parked cars and people who cross."""
     lane, far = rng.uniform(2.8, 3.4), site.travel_m + REACH_M
     parking = rng.uniform(2.0, 2.3)
+    # Without parked cars on the left there is a gutter.
     parking_left = parking if rng.random() < 0.5 else 0.3
     right, left = -lane / 2 - parking, 1.5 * lane + parking_left
     pavement = rng.uniform(1.8, 3.2)

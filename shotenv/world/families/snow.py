@@ -57,6 +57,7 @@ def build_wheel_tracks(site: Site, rng: np.random.Generator) -> None:
     asphalt, far = m.ASPHALT.draw(rng), site.travel_m + REACH_M
     # Neither dry asphalt nor snow: dark where it is worn through, bright where slush is left.
     worn = Material(asphalt.albedo_low, rng.uniform(0.2, 0.8), 2.0, mirror=0.03)
+    # The first two are the ego's own lane.
     for y in (-0.75, 0.75, 2.0, 3.2)[: 2 * rng.integers(1, 3)]:
         site.build(
             meshes.patch((-BEHIND_M, far), (y - 0.18, y + 0.18), 0.004, worn), sheltered=True

@@ -49,6 +49,7 @@ def put_walkers(
     draw: DrawPasser = passer_by,
 ) -> None:
     """People who stand or move along the road, either way: at least count[0], below count[1]."""
+    # Beyond where the ego will stop: who stood in its way would be left out anyhow.
     near = site.travel_m + 0.9
     # As far as people are more than a few pixels, and within the room where there is one.
     far = max(near, min(near + 17.0, site.room[1, 0] - 0.5))
@@ -74,6 +75,7 @@ def put_crossers(
         somebody, wish = draw(rng, site.weather.wetness)
         # In a long clip they walk slower, rather than through what stands beside the road.
         speed = min(wish, (y[1] - y[0]) / site.duration_s)
+        # What is left to choose the start from, if the whole walk is to fit between the sides.
         room = y[1] - y[0] - speed * site.duration_s
         for _ in range(TRIES):
             start, side = y[0] + rng.uniform() * room, rng.choice([-1.0, 1.0])

@@ -34,6 +34,7 @@ HIGH_BAY_IRRADIANCE: Range = (1e-2, 0.3)
 def lay_out_warehouse(site: Site, rng: np.random.Generator) -> None:
     """An aisle between racks that ends at docks."""
     aisle, height = rng.uniform(3.2, 4.4), rng.uniform(5.5, 8.5)
+    # Many clips end close by: near distances would be rare otherwise.
     near = rng.random() < 0.4
     end = site.travel_m + (1.0 + 5.0 * rng.uniform() if near else rng.uniform(9.0, 28.0))
     half = aisle / 2 + 2 * RACK_DEPTH_M + 2.8
@@ -91,6 +92,7 @@ def build_docks(
     site.build(lintel)
     if is_open:
         yard = (end, end + REACH_M), (-REACH_M, REACH_M)
+        # A little lower, so that it does not lie in one plane with the floor at the threshold.
         site.build(meshes.patch(*yard, -0.01, m.ASPHALT.draw(rng)))
         return
     site.build(meshes.box((0.1, width, high), wall, (end + 0.25, 0.0, 0.0)))
@@ -128,6 +130,7 @@ def put_fork_lift(site: Site, rng: np.random.Generator, end: float, aisle: float
         return
     speed = rng.uniform(0.8, 3.0) if rng.random() < 0.7 else 0.0
     x, yaw = site.travel_m + rng.uniform(4.0, 10.0), rng.integers(2) * np.pi
+    # 0.9 m is half of its width and some clearance.
     offset = (aisle / 2 - 0.9) * rng.uniform(-0.6, 1.0)
     site.put_moving(fork_lift(rng), Motion(Pose((min(x, end - 3.0), offset, 0.0), yaw), speed))
 
@@ -164,6 +167,7 @@ def pallet_rack(rng: np.random.Generator, levels: int) -> Mesh:
     ]
     for level in range(levels):
         z = step * level
+        # The lowest pallets stand on the floor, without beams.
         if level:
             parts += [
                 meshes.box((0.05, BAY_M - 0.2, 0.12), beam, (x, 0.0, z - 0.12))

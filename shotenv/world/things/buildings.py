@@ -38,6 +38,7 @@ def facade(rng: np.random.Generator, length_m: float, lit: bool = False) -> Mesh
         meshes.box((0.14, length_m, 0.18), trim, (0.07, 0.0, 3.0)),
     ]
     pitch = rng.uniform(1.9, 2.8)
+    # Windows of the upper row stand above those of the lower; one of the lower is the door.
     openings = np.arange(-length_m / 2 + pitch / 2, length_m / 2 - pitch / 2 + 0.01, pitch)
     door = rng.integers(len(openings))
     for i, y in enumerate(openings):

@@ -27,6 +27,7 @@ def bus_shelter(rng: np.random.Generator, radiance: float = 0.0) -> Mesh:
         for x in (-depth / 2, depth / 2 - 0.3)
         for y in (-half, half)
     ]
+    # Three panes behind, with gaps between them, and one at the side that has no poster.
     rear = np.linspace(-half + 0.05, half - 0.05, 4)
     panes = [
         upright_pane((-depth / 2, y + 0.03), (-depth / 2, z - 0.03), (0.25, 2.1), glass)
@@ -63,6 +64,8 @@ def shop_front(rng: np.random.Generator, length_m: float, radiance: float = 0.0)
     body, frame, glass = m.PLASTER.draw(rng), m.DARK_METAL.draw(rng), m.CLEAR_GLASS.draw(rng)
     inside, floor = m.PLASTER.draw(rng), m.COATED_FLOOR.draw(rng)
     posts = np.linspace(-half + 0.1, half - 0.1, max(3, round(length_m / 2.2) + 1))
+    # Upper floors, lintel, plinth, the room's rear wall, floor, glowing ceiling, side walls, posts,
+    # panes, goods.
     parts = [
         meshes.box((4.0, length_m, height - 3.0), body, (-2.0, 0.0, 3.0)),
         meshes.box((0.2, length_m, 0.3), frame, (-0.1, 0.0, 2.7)),

@@ -21,6 +21,7 @@ from shotenv.decision.score import no_depth, score_depth
 from shotenv.decision.transition import reset, step
 from shotenv.laser.cost import ShotCost
 from unwrap.networks.predictor import load_unwrapper
+from unwrap.support.process_state import torch_threads
 from unwrap.support.tensors import concatenate, put, take
 
 
@@ -91,12 +92,10 @@ def test_reward_is_minus_the_weighted_terms():
 
 def test_means_are_the_same_on_any_number_of_threads():
     maps = torch.rand(3, 240, 320, generator=torch.Generator().manual_seed(0))
-    threads = torch.get_num_threads()
     means = []
     for count in (1, 2):
-        torch.set_num_threads(count)
-        means += [frame_means(maps), torch.cat([frame_means(one[None]) for one in maps])]
-    torch.set_num_threads(threads)
+        with torch_threads(count):
+            means += [frame_means(maps), torch.cat([frame_means(one[None]) for one in maps])]
     assert all(torch.equal(means[0], other) for other in means)
 
 
