@@ -1,4 +1,4 @@
-"""Sequences of frames on disk: rendered once, then read by whoever plays, trains or measures.
+"""Sequences of frames on disk: rendered once, then read.
 
 `open_bank("starter")` opens a bank by the name of its configuration and renders it into the
 user's cache folder on first use; `open_bank("path/to/bank")` opens a folder.
