@@ -104,7 +104,7 @@ class ShotScheduleVectorEnv(VectorEnv):
         """
         rows = np.flatnonzero(self._check_reset_mask(options))
         for row, value in enumerate(self._check_seeds(seed)):
-            # A row that goes on with its drive leaves its seed unused: its next drive stays.
+            # A row that goes on with its drive leaves its seed unused: its next stays the same.
             if value is not None and row in rows:
                 self._generators[row] = seeding.np_random(value)[0]
         infos = self._restart(rows)
