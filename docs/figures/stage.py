@@ -14,7 +14,7 @@ from torch import Tensor
 from shotenv.config import CameraConfig, LaserConfig, SensorConfig, find_config, read_config
 from shotenv.render import RenderedFrame, render_frame
 from shotenv.sensor import Exposure, OffsetPattern, electrons_per_radiance_second, expose
-from shotenv.world.geometry import Light, Material, Mesh, Motion, Pose, World
+from shotenv.world.geometry import Arc, Light, Material, Mesh, Pose, World
 from shotenv.world.geometry.meshes import polygon
 from shotenv.world.geometry.model import MovingObject
 from unwrap.signal import (
@@ -154,12 +154,12 @@ def floor(**material: float) -> Mesh:
 
 def moving(mesh: Mesh, start, yaw_rad: float, speed_m_s: float) -> MovingObject:
     """`mesh` on a straight way."""
-    return MovingObject(mesh, Motion(Pose(start, yaw_rad), speed_m_s))
+    return MovingObject(mesh, Arc(Pose(start, yaw_rad), speed_m_s))
 
 
 def world(static: Mesh, *things: MovingObject, light: Light = DARK) -> World:
     """A world seen from 1 m above the origin, looking ahead."""
-    return World("garage", 0, static, things, light, Motion(Pose((0.0, 0.0, 1.0))))
+    return World("garage", 0, static, things, light, Arc(Pose((0.0, 0.0, 1.0))))
 
 
 def rendered(scene: World, camera: CameraConfig = CAMERA, **options) -> RenderedFrame:

@@ -12,7 +12,7 @@ from shotenv.config import BankConfig
 from shotenv.render import FrameRenderer, RenderedFrame
 from shotenv.sensor import capture_gray, gray_exposure_s
 from shotenv.world import draw_world
-from shotenv.world.geometry import World
+from shotenv.world.geometry import World, ground_speed_m_s, yaw_rate_rad_s
 
 METER_REDUCTION = 4
 """The light meter sees one pixel where the camera sees so many each way; assumed."""
@@ -37,16 +37,14 @@ def render_clip(job: ClipJob) -> str:
     generator = torch.Generator().manual_seed(_seed(job.seed, GRAY_NOISE))
     noise = torch.randn(light["ambient"].shape, generator=generator)
     gray, exposure_s = capture_gray(torch.from_numpy(light["ambient"]), config.sensor, noise=noise)
-    # Speed and yaw rate do not change within a clip, but a recording's may: one value per frame.
-    constant = np.ones(len(times))
     metadata = {
         "name": job.name,
         "family": job.family,
         "seed": job.seed,
         "split": job.split,
         "time_s": times.tolist(),
-        "ego_speed_m_s": (constant * world.ego.speed_m_s).tolist(),
-        "yaw_rate_rad_s": (constant * world.ego.yaw_rate_rad_s).tolist(),
+        "ego_speed_m_s": [ground_speed_m_s(world.ego, time) for time in times],
+        "yaw_rate_rad_s": [yaw_rate_rad_s(world.ego, time) for time in times],
         "gray_exposure_s": exposure_s.tolist(),
     }
     write_clip(job.folder, {**light, "gray": gray.numpy().astype(np.uint16)}, metadata)

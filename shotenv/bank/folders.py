@@ -10,7 +10,7 @@ from typing import Any
 
 from shotenv.config import ACQUISITION_FIELDS, BankConfig
 
-RENDERING_VERSION = 3
+RENDERING_VERSION = 4
 """Raised when the same configuration would give other light: old banks are then left alone."""
 
 SOURCE = "source.json"

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shotenv.world.geometry import Mesh, Motion, Pose, World
+from shotenv.world.geometry import Arc, Mesh, Pose, World, rotation
 from unwrap.support import inlined, loop
 
 Array = np.ndarray
@@ -81,16 +81,6 @@ class Posed:
     tile_m: np.ndarray
 
 
-def rotation(pose: Pose) -> np.ndarray:
-    """Matrix [3, 3] from a pose's own axes to the world: pitch about y first, then yaw about z.
-
-    Both turn by the right-hand rule, so that a positive pitch looks down.
-    """
-    cy, sy = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
-    cp, sp = math.cos(pose.pitch_rad), math.sin(pose.pitch_rad)
-    return np.array([[cy * cp, -sy, cy * sp], [sy * cp, cy, sy * sp], [-sp, 0.0, cp]])
-
-
 def faces_of(world: World) -> Faces:
     """The triangles of `world`."""
     moving = [thing.mesh for thing in world.moving]
@@ -121,7 +111,7 @@ def faces_of(world: World) -> Faces:
 def posed(world: World, faces: Faces, times_s: Sequence[float], bounces: int) -> Posed:
     """The moving ones of `faces` at `times_s` for light paths of at most `bounces` surface hits."""
     own = faces.corners[faces.still :]
-    motions = [thing.motion for thing in world.moving] or [Motion(Pose((0.0, 0.0, 0.0)))]
+    motions = [thing.motion for thing in world.moving] or [Arc(Pose((0.0, 0.0, 0.0)))]
     poses = [[motion.at(time_s) for motion in motions] for time_s in times_s]
     turns = np.array([[rotation(pose) for pose in row] for row in poses])
     places = np.array([[pose.position_m for pose in row] for row in poses])
@@ -220,7 +210,7 @@ def _find_normals(corners: Array, normals: Array) -> None:
 def _nothing(world: World) -> Mesh:
     """A triangle without area below the ego, for worlds in which nothing moves."""
     zero = np.zeros(1, np.float32)
-    buried = np.asarray(world.ego.start.position_m) - (0.0, 0.0, 10.0)
+    buried = np.asarray(world.ego.at(0.0).position_m) - (0.0, 0.0, 10.0)
     corners = np.broadcast_to(buried.astype(np.float32), (1, 3, 3))
     uv = np.zeros((1, 3, 2), np.float32)
     return Mesh(corners, uv, zero, zero, zero, zero, zero, zero)

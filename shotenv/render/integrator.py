@@ -130,23 +130,40 @@ class _Onward:
     @classmethod
     def drawn(cls, hit: Hit, direction, number, sample) -> _Onward:
         """Choose among the shares of the surface by `number`, a diffuse direction by `sample`."""
-        mirrors = number < hit.mirror
-        passes = ~mirrors & (number < hit.mirror + hit.clear)
+        mirror, clear, diffuse = _chances(hit)
+        mirrors = number < mirror
+        passes = ~mirrors & (number < mirror + clear)
         scatters = ~mirrors & ~passes
         scattered = mi.Frame3f(hit.normal).to_world(mi.warp.square_to_cosine_hemisphere(sample))
         mirrored = direction - 2 * dr.dot(direction, hit.normal) * hit.normal
         # One number serves this choice and the lamp's: within its share it is uniform again once
         # that share is stretched to [0, 1).
-        below = dr.select(mirrors, 0, dr.select(passes, hit.mirror, hit.mirror + hit.clear))
+        below = dr.select(mirrors, 0, dr.select(passes, mirror, mirror + clear))
+        chance = dr.select(mirrors, mirror, dr.select(passes, clear, diffuse))
         share = dr.select(mirrors, hit.mirror, dr.select(passes, hit.clear, hit.diffuse))
         return cls(
             start=dr.select(passes, dr.fma(direction, SURFACE_OFFSET_M, hit.point), hit.leave),
             direction=dr.select(passes, direction, dr.select(mirrors, mirrored, scattered)),
-            kept=dr.select(scatters, hit.albedo, 1),
+            kept=dr.select(scatters, hit.albedo, 1) * share / chance,
             scatters=scatters,
             passes=passes,
-            number=(number - below) / share,
+            number=(number - below) / chance,
         )
+
+
+LEAST_CHANCE, MOST_CHANCE = 0.5, 0.75
+"""Chance, at least and at most, of going on mirrored or straight through where a surface does so
+besides scattering: what a wet road mirrors is bright and sharp, what it scatters dim and smooth, so
+that chances in proportion to the shares would leave the first to luck."""
+
+
+def _chances(hit: Hit):
+    """Chances of going on mirrored, straight through, and diffusely; their sum is 1."""
+    straight = hit.mirror + hit.clear
+    mixed = dr.clip(straight, LEAST_CHANCE, MOST_CHANCE)
+    chance = dr.select(straight > 0, dr.select(hit.diffuse > 0, mixed, 1), 0)
+    scale = dr.select(straight > 0, chance / straight, 0)
+    return hit.mirror * scale, hit.clear * scale, 1 - chance
 
 
 def _follow(
@@ -169,6 +186,8 @@ def _follow(
     # by another way than the camera looks. `seeks_sky`: a ray that meets nothing sees the sky,
     # which no aimed ray has counted already.
     way_back, bent, seeks_sky = mi.Float(1), mi.Bool(False), sources.passive_on
+    # Density of having scattered to the surface, per its area: of the laser's two ways to it one.
+    found = mi.Float(dr.inf)
     # A Python loop: each bounce is traced into the one kernel, which knows the first and the last.
     for bounce in range(bounces):
         laser_on, passive_on = hit.valid & sources.laser_on, hit.valid & sources.passive_on
@@ -176,8 +195,13 @@ def _follow(
         returned = dr.select(laser_on, throughput * way_back * returned, 0)
         light.add_active(returned, 2 * walked_m)
         if bounce > 0:
-            radiance, leg_m = _laser_straight(scene, sources.eye, hit, instant, laser_on & bent)
+            lit = laser_on & bent
+            radiance, leg_m = _laser_straight(scene, sources.eye, hit, instant, lit, found)
             light.add_active(throughput * radiance, walked_m + leg_m)
+        if bounce + 1 < bounces:
+            point = sampler.next_2d()
+            radiance, way_m = _laser_by_emission(scene, sources.eye, hit, instant, point, laser_on)
+            light.add_active(throughput * radiance, walked_m + way_m)
         # Faces of lamps glow for the camera and its mirrors alone: what they shine on others is
         # the `Lamp`'s, and would be counted twice.
         glow = dr.select(passive_on & (way_back > 0), hit.emission, 0)
@@ -185,12 +209,12 @@ def _follow(
 
         # Every lane draws all numbers at each surface, used or not, so that lanes stay in step.
         aim, which = sampler.next_2d(), sampler.next_1d()
-        number, sample = sampler.next_1d(), sampler.next_2d()
+        number, sample = sampler.next_choice(), sampler.next_2d()
         onward = _Onward.drawn(hit, direction, number, sample)
         numbers = aim, which, onward.number
         irradiance = passive.irradiance(scene, hit, instant, numbers, passive_on)
-        # Per what is kept: the surface reflects to the camera whatever way the path goes on.
-        irradiance *= hit.diffuse * dr.select(onward.scatters, 1, hit.albedo)
+        # The surface reflects to the camera whatever way the path goes on.
+        light.ambient += throughput * irradiance * hit.diffuse * hit.albedo * dr.inv_pi
         throughput *= onward.kept
         seeks_sky = passive_on & dr.select(
             onward.scatters, ~passive.sky_is_aimed_at(hit), seeks_sky | ~onward.passes
@@ -203,13 +227,27 @@ def _follow(
             )
             previous, hit = hit, scene.hit(onward.start, direction, instant, hit.valid)
             walked_m += dr.norm(hit.point - previous.point)
+            density = _density_by_scattering(previous, hit.point, hit.normal)
+            found = dr.select(onward.scatters, density, dr.inf)
             free = dr.select(seeks_sky & ~hit.valid, 1, 0)
         else:
             # Nothing is seen of a surface beyond the last bounce: whether the sky is, is enough.
             reach = mi.Float(REACH_M)
             free = scene.transmission(onward.start, direction, reach, instant, seeks_sky)
-        light.ambient += throughput * dr.fma(irradiance, dr.inv_pi, passive.sky(direction) * free)
+        light.ambient += throughput * passive.sky(direction) * free
     return light
+
+
+def _density_by_scattering(hit: Hit, point, normal):
+    """Density, per area of a surface at `point`, of scattering from `hit` to that point, m-2."""
+    way = point - hit.point
+    # Points of one corner may lie on each other.
+    square = dr.maximum(dr.squared_norm(way), 1e-8)
+    direction = way * dr.rsqrt(square)
+    leaving = dr.maximum(dr.dot(hit.normal, direction), 0)
+    arriving = dr.maximum(-dr.dot(normal, direction), 0)
+    *_, diffuse = _chances(hit)
+    return diffuse * dr.inv_pi * leaving * arriving / square
 
 
 def _laser_along_view(eye: Pinhole, hit: Hit, direction, distance_m):
@@ -223,15 +261,46 @@ def _laser_along_view(eye: Pinhole, hit: Hit, direction, distance_m):
     return _reflected(hit, eye.intensity, cosine, distance_m) * (1 + retro)
 
 
-def _laser_straight(scene: Scene, eye: Pinhole, hit: Hit, instant, active):
-    """Radiance per watt of the laser's light that came straight, and its distance."""
+def _laser_straight(scene: Scene, eye: Pinhole, hit: Hit, instant, active, found):
+    """Radiance per watt of the laser's light that came straight, and its distance.
+
+    `found` is the density, per area, of having found the surface by scattering, infinite where no
+    other way leads there. Where the laser could have found it by its own emission, both ways are
+    weighted by their densities (balance heuristic, Veach and Guibas 1995).
+    """
     intensity, direction, distance = eye.laser(hit.point, instant)
     cosine = dr.maximum(dr.dot(hit.normal, direction), 0)
     radiance = _reflected(hit, intensity, cosine, distance)
     lit = active & (radiance > 0)
     length = distance - SURFACE_OFFSET_M
     share = scene.transmission(hit.leave, direction, length, instant, lit)
-    return dr.select(lit, radiance * share, 0), dr.minimum(distance, REACH_M)
+    emitted = eye.emission_density(direction, instant) * cosine / dr.square(distance)
+    # Emission stops at the first surface, so that behind a pane it finds nothing.
+    weight = dr.select((share == 1) & (found < dr.inf), found / (found + emitted), 1)
+    return dr.select(lit, radiance * share * weight, 0), dr.minimum(distance, REACH_M)
+
+
+def _laser_by_emission(scene: Scene, eye: Pinhole, hit: Hit, instant, sample, active):
+    """Radiance per watt of the surface `hit` in the light of a point that the laser shines on.
+
+    And the length of the way from the laser over that point. The other half of `_laser_straight`:
+    surfaces near the laser, which scattering finds by rare luck, are found here by plenty.
+    """
+    origin, direction, per_sr = eye.emitted(sample, instant)
+    lit = scene.hit(origin, direction, instant, active)
+    way = lit.leave - hit.leave
+    length = dr.norm(way)
+    toward = way / length
+    cosine = dr.maximum(-dr.dot(lit.normal, direction), 0)
+    emitted = per_sr * cosine / dr.square(lit.distance_m)
+    found = _density_by_scattering(hit, lit.point, lit.normal)
+    *_, diffuse = _chances(hit)
+    radiance = _reflected(lit, eye.intensity, cosine, lit.distance_m)
+    # Scattering keeps hit.diffuse * hit.albedo per density / chance.
+    radiance *= hit.diffuse * hit.albedo * found / (diffuse * (found + emitted))
+    seen = active & lit.valid & (radiance > 0)
+    share = scene.transmission(hit.leave, toward, length - SURFACE_OFFSET_M, instant, seen)
+    return dr.select(seen & (share == 1), radiance, 0), lit.distance_m + length
 
 
 def _reflected(hit: Hit, intensity, cosine, distance_m):

@@ -15,10 +15,10 @@ import mitsuba as mi
 import numpy as np
 
 from shotenv.render.backend import only_where, upload
-from shotenv.render.geometry import REACH_M, rotation
+from shotenv.render.geometry import REACH_M
 from shotenv.render.instants import Instants
 from shotenv.render.scene import Hit, Scene
-from shotenv.world.geometry import MAX_LAMPS, Indoor, Lamp, World
+from shotenv.world.geometry import MAX_LAMPS, Indoor, Lamp, World, rotation
 
 _LAMP_NUMBERS = 12
 """Numbers of a lamp: three packets of four, as they are gathered."""

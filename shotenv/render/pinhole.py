@@ -11,9 +11,8 @@ import numpy as np
 
 from shotenv.config import CameraConfig
 from shotenv.render.backend import upload
-from shotenv.render.geometry import rotation
 from shotenv.render.instants import Instants
-from shotenv.world.geometry import Motion
+from shotenv.world.geometry import Motion, rotation
 
 
 def half_extents(camera: CameraConfig) -> tuple[float, float]:
@@ -55,6 +54,29 @@ class Pinhole:
         ahead, leftward, upward = self._axes_at(lanes.instant)
         direction = dr.normalize(ahead + left * leftward + up * upward)
         return self._position_at(lanes.instant), direction
+
+    def emitted(self, sample, instant) -> tuple[Any, Any, Any]:
+        """Origin and direction of a ray of the laser's light, and its density per solid angle.
+
+        Drawn evenly over the image plane by a point `sample` of the unit square.
+        """
+        across, down = half_extents(self._camera)
+        ahead, leftward, upward = self._axes_at(instant)
+        left, up = across * (1 - 2 * sample.x), down * (1 - 2 * sample.y)
+        way = ahead + left * leftward + up * upward
+        length = dr.norm(way)
+        per_sr = length * length * length / (4 * across * down)
+        return self._position_at(instant), way / length, per_sr
+
+    def emission_density(self, to_laser, instant):
+        """Density of `emitted` per solid angle, of a ray against the direction `to_laser`."""
+        across, down = half_extents(self._camera)
+        ahead, leftward, upward = self._axes_at(instant)
+        depth = -dr.dot(to_laser, ahead)
+        inside = (dr.abs(dr.dot(to_laser, leftward)) <= across * depth) & (
+            dr.abs(dr.dot(to_laser, upward)) <= down * depth
+        )
+        return dr.select(inside, dr.rcp(depth * depth * depth) / (4 * across * down), 0)
 
     def laser(self, point, instant) -> tuple[Any, Any, Any]:
         """Radiant intensity (W sr-1 per watt) towards `point`, direction from it, distance."""

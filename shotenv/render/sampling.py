@@ -49,6 +49,7 @@ class Sampler:
         self._rng = mi.PCG32(1, mi.UInt64(first), mi.UInt64(second))
         draw = dr.gather(mi.UInt32, mi.UInt32(list(instants.draw)), lanes.instant)
         self._index = draw * camera.samples_per_pixel + lanes.sample
+        self._sample, self._samples = lanes.sample, camera.samples_per_pixel
         count = (max(instants.draw) + 1) * camera.samples_per_pixel
         # XOR with a number below the next power of two shuffles and keeps the sequence's blocks.
         self._shuffle_mask = (1 << (count - 1).bit_length()) - 1
@@ -56,6 +57,16 @@ class Sampler:
     def next_1d(self):
         """A number in [0, 1)."""
         return _wrap(self._order() * _STEP_1D + self._rng.next_float32())
+
+    def next_choice(self):
+        """A number in [0, 1), one in each n-th part of it for the n samples of a pixel.
+
+        For choices: of two that are as likely each is then taken by half of the samples.
+        """
+        turned = (
+            self._sample + mi.UInt32(self._rng.next_float32() * self._samples)
+        ) % self._samples
+        return (mi.Float(turned) + self._rng.next_float32()) * (1 / self._samples)
 
     def next_2d(self):
         """A point of the unit square."""

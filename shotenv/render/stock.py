@@ -12,10 +12,10 @@ import mitsuba as mi
 import numpy as np
 
 from shotenv.config import CameraConfig
-from shotenv.render.geometry import faces_of, posed, rotation
+from shotenv.render.geometry import faces_of, posed
 from shotenv.render.scene import triangle_mesh
 from shotenv.render.texture import noise_texture
-from shotenv.world.geometry import Light, Pose, World
+from shotenv.world.geometry import Light, Pose, World, rotation
 
 _NEAR_CLIP_M = 1e-5
 """Mitsuba's camera rays start on the near plane, by default 1 cm ahead, and a time-resolved film

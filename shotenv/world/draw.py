@@ -6,7 +6,7 @@ import numpy as np
 
 from shotenv.config import Family, WorldConfig
 from shotenv.world.families import SETTINGS
-from shotenv.world.geometry import Motion, Pose, Site, World, draw_weather, lights
+from shotenv.world.geometry import Arc, Pose, Site, World, draw_weather, lights
 from unwrap.support import Range
 
 LONGEST_DRIVE_M = 90.0
@@ -86,7 +86,7 @@ def draw_ego_speed(
 
 def draw_ego(
     rng: np.random.Generator, speed_m_s: float, duration_s: float, yaw_std_rad: float
-) -> Motion:
+) -> Arc:
     """Path of the camera: a height, a slight pitch, and a bend too slight to leave the lane."""
     height, pitch = float(rng.uniform(*CAMERA_HEIGHT_M)), float(rng.uniform(*CAMERA_PITCH_RAD))
     yaw, rate = rng.normal(0.0, (yaw_std_rad, YAW_RATE_STD_RAD_S))
@@ -97,4 +97,4 @@ def draw_ego(
     start = Pose((0.0, 0.0, height), float(np.clip(yaw, -most_yaw, most_yaw)), pitch)
     # Who stands still does not turn either.
     turning = float(np.clip(rate, -most_rate, most_rate)) * (speed_m_s > 0)
-    return Motion(start, speed_m_s, turning)
+    return Arc(start, speed_m_s, turning)

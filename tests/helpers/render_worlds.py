@@ -9,7 +9,8 @@ import numpy as np
 from shotenv.config.bank import CameraConfig
 from shotenv.render.instants import Instants
 from shotenv.world.geometry.meshes import join
-from shotenv.world.geometry.model import Light, Mesh, Motion, MovingObject, Pose, World
+from shotenv.world.geometry.model import Light, Mesh, MovingObject, World
+from shotenv.world.geometry.motion import Arc, Pose
 
 DARK = Light(0.0, (0.0, 0.0, 1.0), 0.0, 0.0, ())
 ALBEDO = 0.4
@@ -59,7 +60,7 @@ def world(
     speed_m_s: float = 0.0,
 ) -> World:
     """A world seen from (0, 0, height), looking ahead."""
-    ego = Motion(Pose((0.0, 0.0, height_m), 0.0, pitch_rad), speed_m_s)
+    ego = Arc(Pose((0.0, 0.0, height_m), 0.0, pitch_rad), speed_m_s)
     return World("garage", 0, static, moving, light, ego)
 
 

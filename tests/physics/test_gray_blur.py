@@ -9,7 +9,8 @@ import pytest
 from render_worlds import SMALL, mesh, ray_directions, square, world
 
 from shotenv.render.frame import render_frame
-from shotenv.world.geometry.model import Motion, MovingObject, Pose
+from shotenv.world.geometry.model import MovingObject
+from shotenv.world.geometry.motion import Arc, Pose
 
 pytestmark = pytest.mark.render
 DISTANCE_M, SPEED_M_S, SIDE_M, TIME_S = 5.0, 60.0, 1.0, 0.1
@@ -23,7 +24,7 @@ def passing_square():
     start = (DISTANCE_M, -SPEED_M_S * TIME_S, 1.0)
     face = mesh(square((0, 0, 0), (SIDE_M / 2, 0, 0), (0, 0, SIDE_M / 2)), emission=3.0)
     ground = mesh(square((0, 0, -50.0), (1, 0, 0), (0, 1, 0)))
-    return world(ground, moving=(MovingObject(face, Motion(Pose(start, math.pi / 2), SPEED_M_S)),))
+    return world(ground, moving=(MovingObject(face, Arc(Pose(start, math.pi / 2), SPEED_M_S)),))
 
 
 @pytest.mark.parametrize("exposure_s", [2.5e-4, 2e-3, 4e-3])

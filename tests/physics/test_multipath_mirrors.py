@@ -25,7 +25,8 @@ from render_worlds import (
 )
 
 from shotenv.render.backend.llvm import start_mitsuba
-from shotenv.world.geometry.model import Lamp, Light, Motion, MovingObject, Pose
+from shotenv.world.geometry.model import Lamp, Light, MovingObject
+from shotenv.world.geometry.motion import Arc, Pose
 
 pytestmark = pytest.mark.render
 SPEED_OF_LIGHT_M_S = 299_792_458.0
@@ -124,7 +125,7 @@ def test_a_pane_and_a_roof_let_nothing_through(trace):
 def test_a_moving_pane_dims_a_lamp_where_it_is_then(trace):
     light = replace(DARK, lamps=(Lamp((3.0, 0.0, 8.0), 4.0),))
     glass = mesh(square((0.0, 0.0, 0.0), (9.0, 0, 0), (0, 9.0, 0)), clear=0.6)
-    sliding = MovingObject(glass, Motion(Pose((0.0, 0.0, 6.0)), 10.0))
+    sliding = MovingObject(glass, Arc(Pose((0.0, 0.0, 6.0)), 10.0))
     scene = world(mesh(wall(5.0)), light=light, moving=(sliding,))
     before, after = trace(scene, at(0.0, 5.0), SMALL, seed=0).ambient
     np.testing.assert_allclose(before, 0.6 * after, rtol=1e-5)

@@ -25,7 +25,8 @@ from render_worlds import (
 )
 
 from shotenv.render.backend.llvm import start_mitsuba
-from shotenv.world.geometry.model import Lamp, Light, Mesh, Motion, MovingObject, Pose
+from shotenv.world.geometry.model import Lamp, Light, Mesh, MovingObject
+from shotenv.world.geometry.motion import Arc, Pose
 
 pytestmark = pytest.mark.render
 SPEED_OF_LIGHT_M_S = 299_792_458.0
@@ -59,7 +60,7 @@ def test_a_tilted_plane_is_at_its_distance_and_returns_its_light(trace):
 
 
 def test_a_camera_that_pitches_and_turns_sees_the_floor_where_it_is(trace):
-    ego = Motion(Pose((3.0, -2.0, 1.5), yaw_rad=0.7, pitch_rad=0.9))
+    ego = Arc(Pose((3.0, -2.0, 1.5), yaw_rad=0.7, pitch_rad=0.9))
     traced = trace(replace(world(mesh(floor())), ego=ego), at(0.0), SMALL, seed=0)
     assert traced.distance_m[0][MIDDLE] == pytest.approx(1.5 / math.sin(0.9), abs=1e-4)
 
@@ -182,8 +183,8 @@ def test_a_lamp_goes_where_its_carrier_goes(trace):
     # In the carrier's own axes the lamp is 1 m ahead and shines ahead: at the wall of x = 10.
     lamp = Lamp((1.0, 0.0, 1.0), 4.0, 0.1, direction=(1.0, 0.0, 0.0), cutoff_cos=0.5, carrier=1)
     buried = mesh(square((0, 0, -50.0), (1, 0, 0), (0, 1, 0)))
-    away = MovingObject(buried, Motion(Pose((0.0, 3.0, 0.0)), 50.0))
-    coming = MovingObject(buried, Motion(Pose((5.0, -2.0, 0.0), math.pi / 2), 1.0, -math.pi / 4))
+    away = MovingObject(buried, Arc(Pose((0.0, 3.0, 0.0)), 50.0))
+    coming = MovingObject(buried, Arc(Pose((5.0, -2.0, 0.0), math.pi / 2), 1.0, -math.pi / 4))
     scene = world(mesh(wall(10.0)), light=replace(DARK, lamps=(lamp,)), moving=(away, coming))
     pose = coming.motion.at(2.0)
     assert pose.yaw_rad == pytest.approx(0.0, abs=1e-9)
@@ -249,7 +250,7 @@ def test_ambient_light_is_that_of_mitsubas_path_integrator(trace):
     camera = SMALL.model_copy(update={"samples_per_pixel": 256, "bounces": 3})
     light = Light(6.0, (-0.48, 0.6, 0.64), 1.0, 1.0, ())
     box = square((3.0, 0.6, 0.5), (0.0, 0.5, 0.0), (0.2, 0.0, 0.5))
-    box = MovingObject(textured(box), Motion(Pose((0.0, 0.0, 0.0))))
+    box = MovingObject(textured(box), Arc(Pose((0.0, 0.0, 0.0))))
     scene = world(
         textured(np.concatenate([floor(8.0), wall(5.0, half_m=3.0)])), light=light, moving=(box,)
     )

@@ -20,7 +20,8 @@ from render_worlds import (
 )
 
 from shotenv.render.frame import render_frame
-from shotenv.world.geometry.model import Motion, MovingObject, Pose
+from shotenv.world.geometry.model import MovingObject
+from shotenv.world.geometry.motion import Arc, Pose
 from unwrap.signal.decoding import decode
 from unwrap.signal.shots import (
     demodulation_phase_rad,
@@ -42,7 +43,7 @@ def sensor(sensor):
 
 def coming(distance_m: float, speed_m_s: float):
     """A wall that comes towards the camera."""
-    motion = Motion(Pose((distance_m, 0.0, 0.0), math.pi), speed_m_s)
+    motion = Arc(Pose((distance_m, 0.0, 0.0), math.pi), speed_m_s)
     return world(BURIED, moving=(MovingObject(mesh(wall(0.0)), motion),))
 
 
@@ -52,7 +53,7 @@ def phase_of(distance_m, frequency_hz: float):
 
 @pytest.mark.parametrize("speed_m_s", [0.0, 20.0])
 def test_each_sample_sees_a_moving_wall_where_it_is_then(sensor, speed_m_s):
-    oncoming = MovingObject(mesh(wall(0.0)), Motion(Pose((10.0, 0.0, 0.0), math.pi), speed_m_s))
+    oncoming = MovingObject(mesh(wall(0.0)), Arc(Pose((10.0, 0.0, 0.0), math.pi), speed_m_s))
     scene = world(mesh(square((0, 0, -50.0), (1, 0, 0), (0, 1, 0))), moving=(oncoming,))
     frame = render_frame(scene, 0.1, SMALL, sensor, seed=0)
     for k, start_s in enumerate(sample_times_s(8, sensor.sample_period_s)):
@@ -67,7 +68,7 @@ def test_each_sample_sees_a_moving_wall_where_it_is_then(sensor, speed_m_s):
 
 
 def test_driving_at_a_wall_is_as_the_wall_coming(sensor):
-    coming = MovingObject(mesh(wall(0.0)), Motion(Pose((10.0, 0.0, 0.0), math.pi), 15.0))
+    coming = MovingObject(mesh(wall(0.0)), Arc(Pose((10.0, 0.0, 0.0), math.pi), 15.0))
     buried = mesh(square((0, 0, -50.0), (1, 0, 0), (0, 1, 0)))
     there = render_frame(world(buried, moving=(coming,)), 0.05, SMALL, sensor, seed=0)
     here = render_frame(world(mesh(wall(10.0)), speed_m_s=15.0), 0.05, SMALL, sensor, seed=0)
@@ -104,7 +105,7 @@ def test_the_motion_error_of_four_samples_has_its_closed_form(sensor, distance_m
 def test_an_edge_that_passes_mixes_what_it_hides_and_shows(sensor):
     near, far, speed_m_s, start_m = 4.0, 9.0, 60.0, 0.3
     shutter = mesh(square((0, 0, 0), (5.0, 0, 0), (0, 0, 9.0)))
-    motion = Motion(Pose((near, start_m - 5.0, 1.0), math.pi / 2), speed_m_s)
+    motion = Arc(Pose((near, start_m - 5.0, 1.0), math.pi / 2), speed_m_s)
     scene = world(mesh(wall(far)), moving=(MovingObject(shutter, motion),))
     correlation = render_frame(scene, 0.0, SMALL, sensor, seed=0).correlation
     ray = ray_directions(SMALL)

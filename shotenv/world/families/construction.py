@@ -8,7 +8,7 @@ import numpy as np
 
 from shotenv.world.families.roads import BEHIND_M, REACH_M, build_puddles
 from shotenv.world.families.traffic import TRIES, draw_one, put_row
-from shotenv.world.geometry import Lamp, Mesh, Motion, Pose, Site, lights, materials as m, meshes
+from shotenv.world.geometry import Arc, Lamp, Mesh, Pose, Site, lights, materials as m, meshes
 from shotenv.world.things import people, wheel
 
 FLOOD_IRRADIANCE = (5e-3, 5e-2)
@@ -60,7 +60,7 @@ def put_machines(site: Site, rng: np.random.Generator, half: float) -> None:
         speed = rng.uniform(1.0, 5.0) if rng.random() < 0.6 else 0.0
         x = rng.uniform(6.0, 20.0) + 0.5 * site.travel_m
         offset = rng.uniform(0.3, 1.0) * (half - 1.2)
-        site.put_moving(dumper(rng), Motion(Pose((x, offset, 0.0), np.pi), speed))
+        site.put_moving(dumper(rng), Arc(Pose((x, offset, 0.0), np.pi), speed))
 
 
 def put_crew(site: Site, rng: np.random.Generator, half: float) -> None:
@@ -69,7 +69,7 @@ def put_crew(site: Site, rng: np.random.Generator, half: float) -> None:
         somebody, speed = passing_worker(rng)
         for _ in range(TRIES):
             place = (site.travel_m + rng.uniform(1.2, 14.0), rng.uniform(-half, half), 0.004)
-            if site.put_moving(somebody, Motion(Pose(place, rng.uniform(-np.pi, np.pi)), speed)):
+            if site.put_moving(somebody, Arc(Pose(place, rng.uniform(-np.pi, np.pi)), speed)):
                 break
 
 

@@ -16,10 +16,10 @@ from shotenv.world.families.traffic import (
     put_walkers,
 )
 from shotenv.world.geometry import (
+    Arc,
     Indoor,
     Lamp,
     Mesh,
-    Motion,
     Pose,
     Site,
     lights,
@@ -62,7 +62,7 @@ def lay_out_garage(site: Site, rng: np.random.Generator) -> None:
     put_walkers(site, rng, (1, 3), (-aisle / 2 + 0.3, aisle / 2 - 0.3))
     if rng.random() < 0.35:
         x = rng.uniform(8.0, 20.0) + site.travel_m
-        path = Motion(Pose((x, aisle / 4, 0.0), np.pi), rng.uniform(0.5, 3.0))
+        path = Arc(Pose((x, aisle / 4, 0.0), np.pi), rng.uniform(0.5, 3.0))
         put_approaching(site, rng, path, vehicles.car)
     put_vehicle_ahead(site, rng)
     put_row(site, rng, low_thing, rng.choice([-1, 1]) * (aisle / 2 - 0.2), 4.0, 0.0, share=0.4)
@@ -238,7 +238,7 @@ def lay_out_tunnel(site: Site, rng: np.random.Generator) -> None:
     put_vehicle_ahead(site, rng)
     if rng.random() < 0.6:
         x = rng.uniform(6.0, 26.0) + 0.5 * site.travel_m
-        put_approaching(site, rng, Motion(Pose((x, lane, 0.0), np.pi), rng.uniform(3.0, 14.0)))
+        put_approaching(site, rng, Arc(Pose((x, lane, 0.0), np.pi), rng.uniform(3.0, 14.0)))
     put_walkers(site, rng, (0, 2), (centre - half + 0.3, centre - half + 0.5), 0.15)
 
 

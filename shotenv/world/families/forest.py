@@ -6,7 +6,7 @@ import numpy as np
 
 from shotenv.world.families.roads import BEHIND_M, REACH_M, build_puddles
 from shotenv.world.families.traffic import TRIES, draw_one, put_row, put_walkers
-from shotenv.world.geometry import Mesh, Motion, Pose, Site, materials as m, meshes
+from shotenv.world.geometry import Arc, Mesh, Pose, Site, materials as m, meshes
 from shotenv.world.things import cycles, plants
 
 
@@ -24,7 +24,7 @@ def lay_out_forest_path(site: Site, rng: np.random.Generator) -> None:
     put_walkers(site, rng, (0, 3), (-half + 0.2, half - 0.2), 0.004)
     if rng.random() < 0.3:
         x, speed = site.travel_m + rng.uniform(5.0, 14.0), rng.uniform(2.0, 6.0)
-        path = Motion(Pose((x, 0.4 * half, 0.004), np.pi), speed)
+        path = Arc(Pose((x, 0.4 * half, 0.004), np.pi), speed)
         site.put_moving(cycles.cyclist(rng), path)
     put_deer(site, rng, half)
     # The further off, the sparser and the coarser: what is behind is mostly hidden.
@@ -55,7 +55,7 @@ def put_deer(site: Site, rng: np.random.Generator, half: float) -> None:
         for _ in range(TRIES):
             x, away = site.travel_m + rng.uniform(3.0, 16.0), side * rng.uniform(half + 0.8, 7.0)
             yaw = -side * np.pi / 2 + rng.uniform(-0.4, 0.4)
-            if site.put_moving(animal, Motion(Pose((x, away, 0.0), yaw), speed)):
+            if site.put_moving(animal, Arc(Pose((x, away, 0.0), yaw), speed)):
                 break
 
 

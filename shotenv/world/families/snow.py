@@ -17,7 +17,7 @@ from shotenv.world.families.traffic import (
     put_vehicle_ahead,
     put_walkers,
 )
-from shotenv.world.geometry import Material, Mesh, Motion, Pose, Site, materials as m, meshes
+from shotenv.world.geometry import Arc, Material, Mesh, Pose, Site, materials as m, meshes
 from shotenv.world.things import cab, nose_lamps, people, plants, vehicles, wheel
 
 
@@ -30,7 +30,7 @@ def lay_out_snowy_street(site: Site, rng: np.random.Generator) -> None:
     if rng.random() < 0.5:
         x, lane = rng.uniform(8.0, 24.0) + 0.5 * site.travel_m, rng.uniform(0.5, 0.9) * half
         draw = snow_plough if rng.random() < 0.6 else vehicles.traffic
-        put_approaching(site, rng, Motion(Pose((x, lane, 0.0), np.pi), rng.uniform(2.0, 8.0)), draw)
+        put_approaching(site, rng, Arc(Pose((x, lane, 0.0), np.pi), rng.uniform(2.0, 8.0)), draw)
     put_crossers(site, rng, (-half, half))
     for _ in range(rng.integers(0, 3)):
         put_sledge(site, rng, half)
@@ -70,7 +70,7 @@ def put_sledge(site: Site, rng: np.random.Generator, half: float) -> None:
     for _ in range(TRIES):
         place = (site.travel_m + rng.uniform(1.5, 12.0), rng.uniform(-half, half), 0.0)
         yaw = rng.integers(2) * np.pi + rng.uniform(-0.2, 0.2)
-        if site.put_moving(mesh, Motion(Pose(place, yaw), speed)):
+        if site.put_moving(mesh, Arc(Pose(place, yaw), speed)):
             return
 
 

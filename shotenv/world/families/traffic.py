@@ -6,7 +6,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from shotenv.world.geometry import Lamp, Mesh, Motion, Pose, Site, lights, materials as m
+from shotenv.world.geometry import (
+    Arc,
+    Lamp,
+    Mesh,
+    Pose,
+    Site,
+    ground_speed_m_s,
+    lights,
+    materials as m,
+)
 from shotenv.world.things import cycles, furniture, people, plants, shelters, vehicles
 from unwrap.support import Range
 
@@ -58,7 +67,7 @@ def put_walkers(
         for _ in range(TRIES):
             yaw = rng.integers(2) * np.pi + rng.uniform(-0.05, 0.05)
             place = (rng.uniform(near, far), rng.uniform(*y), z)
-            if site.put_moving(somebody, Motion(Pose(place, yaw), speed)):
+            if site.put_moving(somebody, Arc(Pose(place, yaw), speed)):
                 break
 
 
@@ -82,7 +91,7 @@ def put_crossers(
             across = start if side > 0 else y[0] + y[1] - start
             x = site.travel_m + near + max(span, 0.0) * rng.uniform() ** 1.5
             yaw = side * np.pi / 2 + rng.uniform(-0.2, 0.2)
-            if site.put_moving(somebody, Motion(Pose((x, across, 0.0), yaw), speed)):
+            if site.put_moving(somebody, Arc(Pose((x, across, 0.0), yaw), speed)):
                 break
 
 
@@ -90,15 +99,16 @@ def put_vehicle_ahead(site: Site, rng: np.random.Generator) -> None:
     """Perhaps a vehicle ahead in the ego's lane: close in a queue, further off when fast."""
     if rng.random() < 0.4:
         return
-    speed = site.ego.speed_m_s * rng.uniform(0.8, 1.15)
+    ego_speed = ground_speed_m_s(site.ego, 0.0)
+    speed = ego_speed * rng.uniform(0.8, 1.15)
     # Braking shortens the gap during the clip.
-    gap = 0.6 + rng.uniform(0.0, 3.5) + 0.8 * site.ego.speed_m_s * rng.uniform(0.3, 1.2)
+    gap = 0.6 + rng.uniform(0.0, 3.5) + 0.8 * ego_speed * rng.uniform(0.3, 1.2)
     tail = m.log_uniform(rng, TAIL_RADIANCE) if site.night else 0.0
     vehicle = cycles.cyclist(rng) if rng.random() < 0.12 else vehicles.traffic(rng, 0.0, tail)
     # The gap is to its rear, however long it is.
     rear = float(vehicle.corners[..., 0].min())
     start = Pose((gap + 0.4 - rear, rng.uniform(-0.3, 0.3), 0.0))
-    site.put_moving(vehicle, Motion(start, speed))
+    site.put_moving(vehicle, Arc(start, speed))
 
 
 def put_oncoming(site: Site, rng: np.random.Generator, lane: float) -> None:
@@ -106,13 +116,13 @@ def put_oncoming(site: Site, rng: np.random.Generator, lane: float) -> None:
     for _ in range(rng.integers(0, 3)):
         speed = rng.uniform(3.0, 14.0) if rng.random() < 0.75 else 0.0
         x, y = rng.uniform(5.0, 28.0) + 0.5 * site.travel_m, lane + rng.uniform(-0.2, 0.3)
-        put_approaching(site, rng, Motion(Pose((x, y, 0.0), np.pi), speed))
+        put_approaching(site, rng, Arc(Pose((x, y, 0.0), np.pi), speed))
 
 
 def put_approaching(
     site: Site,
     rng: np.random.Generator,
-    motion: Motion,
+    motion: Arc,
     draw: Callable[[np.random.Generator, float], Mesh] = vehicles.traffic,
 ) -> None:
     """A vehicle seen from the front, in the dark with its head lights on."""
@@ -139,7 +149,7 @@ def put_cyclist(site: Site, rng: np.random.Generator, y: float) -> None:
     """Perhaps somebody on a bicycle at the edge of the lane."""
     if rng.random() < 0.3:
         x, speed = site.travel_m * rng.uniform() + rng.uniform(4.0, 12.0), rng.uniform(2.5, 6.5)
-        site.put_moving(cycles.cyclist(rng), Motion(Pose((x, y, 0.0)), speed))
+        site.put_moving(cycles.cyclist(rng), Arc(Pose((x, y, 0.0)), speed))
 
 
 def put_row(

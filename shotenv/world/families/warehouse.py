@@ -8,11 +8,11 @@ from shotenv.world.families.construction import passing_worker
 from shotenv.world.families.roads import BEHIND_M, PAINT_M, REACH_M
 from shotenv.world.families.traffic import draw_one, put_crossers, put_row, put_walkers
 from shotenv.world.geometry import (
+    Arc,
     Indoor,
     Lamp,
     Material,
     Mesh,
-    Motion,
     Pose,
     Site,
     lights,
@@ -132,7 +132,7 @@ def put_fork_lift(site: Site, rng: np.random.Generator, end: float, aisle: float
     x, yaw = site.travel_m + rng.uniform(4.0, 10.0), rng.integers(2) * np.pi
     # 0.9 m is half of its width and some clearance.
     offset = (aisle / 2 - 0.9) * rng.uniform(-0.6, 1.0)
-    site.put_moving(fork_lift(rng), Motion(Pose((min(x, end - 3.0), offset, 0.0), yaw), speed))
+    site.put_moving(fork_lift(rng), Arc(Pose((min(x, end - 3.0), offset, 0.0), yaw), speed))
 
 
 def build_high_bays(site: Site, rng: np.random.Generator, end: float, height: float) -> None:

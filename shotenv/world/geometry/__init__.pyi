@@ -6,9 +6,15 @@ from .model import (
     Lamp as Lamp,
     Light as Light,
     Mesh as Mesh,
+    World as World,
+)
+from .motion import (
+    Arc as Arc,
     Motion as Motion,
     Pose as Pose,
-    World as World,
+    ground_speed_m_s as ground_speed_m_s,
+    rotation as rotation,
+    yaw_rate_rad_s as yaw_rate_rad_s,
 )
 from .site import Site as Site
 from .weather import draw_weather as draw_weather

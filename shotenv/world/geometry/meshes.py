@@ -15,7 +15,8 @@ import numpy as np
 import trimesh
 
 from shotenv.world.geometry.materials import Material
-from shotenv.world.geometry.model import Mesh, Pose
+from shotenv.world.geometry.model import Mesh
+from shotenv.world.geometry.motion import Pose
 
 P = ParamSpec("P")
 Point = tuple[float, float, float]

@@ -6,12 +6,12 @@ band: irradiance W m-2, radiance W m-2 sr-1, radiant intensity W sr-1. No render
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from shotenv.config import Family
+from shotenv.world.geometry.motion import Motion
 
 
 @dataclass(frozen=True)
@@ -49,39 +49,6 @@ class Mesh:
     mirror: np.ndarray
     clear: np.ndarray
     kinds: frozenset[str] = frozenset()
-
-
-@dataclass(frozen=True)
-class Pose:
-    """Position (x, y, z) in metres and heading about z in radians, pitch about y in radians."""
-
-    position_m: tuple[float, float, float]
-    yaw_rad: float = 0.0
-    pitch_rad: float = 0.0
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Constant speed on an arc: the pose at time t from the pose at time 0.
-
-    A person's or a car's path over a clip of a few seconds; yaw rate 0 is a straight line.
-    """
-
-    start: Pose
-    speed_m_s: float = 0.0
-    yaw_rate_rad_s: float = 0.0
-
-    def at(self, time_s: float) -> Pose:
-        """Pose at `time_s`."""
-        turned = self.yaw_rate_rad_s * time_s
-        # Chord of the arc: speed * t * sin(h) / h in the direction start yaw + h, h half the turn.
-        half = turned / 2
-        # sin(h) / h tends to 1: on a straight line the chord is the way itself.
-        chord = self.speed_m_s * time_s * (math.sin(half) / half if half else 1.0)
-        heading = self.start.yaw_rad + half
-        x, y, z = self.start.position_m
-        moved = (x + chord * math.cos(heading), y + chord * math.sin(heading), z)
-        return Pose(moved, self.start.yaw_rad + turned, self.start.pitch_rad)
 
 
 @dataclass(frozen=True)

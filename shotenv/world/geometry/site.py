@@ -18,11 +18,10 @@ from shotenv.world.geometry.model import (
     Lamp,
     Light,
     Mesh,
-    Motion,
     MovingObject,
-    Pose,
     World,
 )
+from shotenv.world.geometry.motion import Motion, Pose
 from shotenv.world.geometry.weather import DRY, Weather, weathered
 from unwrap.support import Range
 
@@ -71,6 +70,7 @@ class Site:
         self.room = np.array([[-np.inf, -np.inf], [np.inf, np.inf]])
         self.ceiling_m = np.inf
         way = np.array([ego.at(time).position_m[:2] for time in self.times])
+        self.travel_m = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
         # The ego is the first to take ground, so that nothing can be put in its way.
         margin = np.array([EGO_AHEAD_M, EGO_BESIDE_M])
         self._taken = [np.stack([way - margin, way + margin], axis=1)]
@@ -79,11 +79,6 @@ class Site:
     def enclose(self, x: Range, y: Range, ceiling_m: float) -> None:
         """From now on keep things inside a rectangle and under a ceiling."""
         self.room, self.ceiling_m = np.array([x, y]).T, ceiling_m
-
-    @property
-    def travel_m(self) -> float:
-        """Length of the ego's path."""
-        return self.ego.speed_m_s * self.duration_s
 
     def build(self, mesh: Mesh, sheltered: bool = False) -> None:
         """Add ground, ceilings and other things that nothing can run into.

@@ -21,10 +21,11 @@ from shotenv.render.backend import llvm, workers
 from shotenv.render.backend.llvm import RendererError, find_llvm
 from shotenv.render.backend.workers import run_jobs
 from shotenv.render.frame import render_frame
-from shotenv.render.geometry import REACH_M, faces_of, posed, rotation, tile_grid
+from shotenv.render.geometry import REACH_M, faces_of, posed, tile_grid
 from shotenv.render.instants import frame_instants
 from shotenv.render.texture import noise_texture
-from shotenv.world.geometry.model import Lamp, Light, Motion, MovingObject, Pose
+from shotenv.world.geometry.model import Lamp, Light, MovingObject
+from shotenv.world.geometry.motion import Arc, Pose, rotation
 from unwrap.signal.shots import sample_times_s
 
 CAMERA = SMALL.model_copy(update={"samples_per_pixel": 3, "gray_instants": 2, "bounces": 2})
@@ -74,7 +75,7 @@ def test_all_worlds_share_one_kernel(sensor):
     llvm.start_mitsuba()
     import drjit as dr
 
-    thing = MovingObject(mesh(square((3, 0, 1), (0, 0.3, 0), (0, 0, 0.3))), Motion(Pose((0, 0, 0))))
+    thing = MovingObject(mesh(square((3, 0, 1), (0, 0.3, 0), (0, 0, 0.3))), Arc(Pose((0, 0, 0))))
     bare = world(mesh(wall(4.0)), light=DARK)
     worlds = [bare, corner(), corner(moving=(thing,)), corner(moving=(thing,) * 3, speed_m_s=3.0)]
     kernels = set()
@@ -114,7 +115,7 @@ def test_samples_are_taken_at_their_own_instants(sensor):
 
 
 def test_tiles_are_out_of_each_others_reach():
-    things = (MovingObject(mesh(wall(0.0, 5.0)), Motion(Pose((30.0, 10.0, 0.0)), 5.0)),)
+    things = (MovingObject(mesh(wall(0.0, 5.0)), Arc(Pose((30.0, 10.0, 0.0)), 5.0)),)
     times = tuple(np.linspace(0, 1, 12))
     scene = corner(moving=things)
     moving = posed(scene, faces_of(scene), times, bounces=2)
@@ -125,10 +126,10 @@ def test_tiles_are_out_of_each_others_reach():
 
 
 def test_things_stand_where_their_motion_brings_them():
-    motion = Motion(Pose((3.0, -1.0, 0.2), 0.4, 0.1), speed_m_s=8.0, yaw_rate_rad_s=0.7)
+    motion = Arc(Pose((3.0, -1.0, 0.2), 0.4, 0.1), speed_m_s=8.0, yaw_rate_rad_s=0.7)
     thing = MovingObject(mesh(square((0.3, 0.1, 1), (0.2, 0.3, 0), (0, 0.1, 0.5))), motion)
     scene, times = (
-        corner(moving=(MovingObject(mesh(wall(1.0)), Motion(Pose((0, 0, 0)))), thing)),
+        corner(moving=(MovingObject(mesh(wall(1.0)), Arc(Pose((0, 0, 0)))), thing)),
         (0.0, 0.3),
     )
     found = posed(scene, faces_of(scene), times, bounces=2)
@@ -142,7 +143,7 @@ def test_things_stand_where_their_motion_brings_them():
 
 
 def test_panes_stand_with_the_things_that_they_are_part_of():
-    pane = MovingObject(mesh(wall(2.0, 1.0), clear=0.5), Motion(Pose((0, 0, 0)), 5.0))
+    pane = MovingObject(mesh(wall(2.0, 1.0), clear=0.5), Arc(Pose((0, 0, 0)), 5.0))
     scene = replace(corner(moving=(pane,)), static=mesh(wall(7.0), clear=0.3))
     found = posed(scene, faces_of(scene), (0.0, 0.2), bounces=1)
     ahead = (found.panes.reshape(2, 4, 3, 3) - found.tile_m[:, None, None])[..., 0]
@@ -330,5 +331,5 @@ def is_alive(pid: int) -> bool:
 
 def test_a_world_without_anything_that_moves_has_a_face_to_pad_with():
     assert len(faces_of(corner()).thing) == 1
-    moving = replace(corner(), moving=(MovingObject(mesh(wall(3.0)), Motion(Pose((0, 0, 0)))),))
+    moving = replace(corner(), moving=(MovingObject(mesh(wall(3.0)), Arc(Pose((0, 0, 0)))),))
     assert len(faces_of(moving).thing) == 2

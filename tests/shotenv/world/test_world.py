@@ -15,7 +15,8 @@ from shotenv.config.bank import WorldConfig
 from shotenv.config.families import FAMILIES
 from shotenv.world.draw import draw_world
 from shotenv.world.geometry import lights, meshes
-from shotenv.world.geometry.model import MAX_LAMPS, Motion, Pose
+from shotenv.world.geometry.model import MAX_LAMPS
+from shotenv.world.geometry.motion import Arc, Pose
 from shotenv.world.geometry.site import MAX_TRIANGLES, Site
 
 UNAMBIGUOUS_M = 6.2457
@@ -244,7 +245,7 @@ def test_first_distances_are_far_and_near(views):
 @pytest.mark.parametrize("rate", [0.0, 0.3, -1.2])
 def test_motion_is_the_closed_form_of_an_arc(rate):
     start, speed, time = Pose((1.0, -2.0, 0.5), 0.4, 0.1), 7.0, 2.3
-    pose = Motion(start, speed, rate).at(time)
+    pose = Arc(start, speed, rate).at(time)
     if rate:
         radius = speed / rate
         x = 1.0 + radius * (np.sin(0.4 + rate * time) - np.sin(0.4))
@@ -257,18 +258,18 @@ def test_motion_is_the_closed_form_of_an_arc(rate):
 
 
 def test_site_keeps_the_way_and_the_ground_free():
-    site = Site(Motion(Pose((0.0, 0.0, 1.0)), 10.0), 1.0)
+    site = Site(Arc(Pose((0.0, 0.0, 1.0)), 10.0), 1.0)
     assert not site.put(plain_box(), 5.0, 0.0)
     assert site.put(plain_box(), 5.0, 3.0)
     assert not site.put(plain_box(), 5.5, 3.5)
-    assert not site.put_moving(plain_box(), Motion(Pose((5.0, -6.0, 0.0), np.pi / 2), 12.0))
-    assert site.put_moving(plain_box(), Motion(Pose((5.0, -6.0, 0.0), -np.pi / 2), 12.0))
+    assert not site.put_moving(plain_box(), Arc(Pose((5.0, -6.0, 0.0), np.pi / 2), 12.0))
+    assert site.put_moving(plain_box(), Arc(Pose((5.0, -6.0, 0.0), -np.pi / 2), 12.0))
     assert len(site.static) == 1
     assert len(site.moving) == 1
 
 
 def test_site_lets_crowns_hang_over_and_rooms_end():
-    site = Site(Motion(Pose((0.0, 0.0, 1.0)), 0.0), 1.0)
+    site = Site(Arc(Pose((0.0, 0.0, 1.0)), 0.0), 1.0)
     post = meshes.join(
         [plain_box((0.2, 0.2, 3.0)), meshes.at(plain_box((4.0, 4.0, 1.0)), 0.0, 0.0, 3.0)]
     )

@@ -11,7 +11,7 @@ from render_worlds import floor, mesh, square, wall as wall_ahead, world
 
 from shotenv.config.bank import CameraConfig
 from shotenv.render.frame import render_frame
-from shotenv.world.geometry.model import Motion
+from shotenv.world.geometry.motion import Arc
 from unwrap.depth.warp import move_depth
 
 FOV_DEG = 60.0
@@ -196,7 +196,7 @@ def test_moved_depth_agrees_with_the_rendered_next_frame(sensor, yaw_rate_rad_s)
     """Signs and pixel order are those of the renderer, its worlds and its banks."""
     corner = mesh(np.concatenate([wall_ahead(8.0), floor(), side_wall(3.0)]))
     still = world(corner, height_m=1.3)
-    scene = replace(still, ego=Motion(still.ego.start, 6.0, yaw_rate_rad_s))
+    scene = replace(still, ego=Arc(still.ego.start, 6.0, yaw_rate_rad_s))
     before, after = (
         torch.from_numpy(render_frame(scene, time_s, CAMERA, sensor, seed=0).distance_m)[None]
         for time_s in (0.0, 0.1)
