@@ -16,5 +16,14 @@ from .motion import (
     rotation as rotation,
     yaw_rate_rad_s as yaw_rate_rad_s,
 )
+from .road import Curve as Curve
 from .site import Site as Site
+from .speed import (
+    HIGHEST_SPEED_M_S as HIGHEST_SPEED_M_S,
+    SpeedChange as SpeedChange,
+    SpeedProfile as SpeedProfile,
+    change_s as change_s,
+    speeds_in_turn as speeds_in_turn,
+)
+from .vehicle import Body as Body, Drive as Drive
 from .weather import draw_weather as draw_weather

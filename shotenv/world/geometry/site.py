@@ -1,19 +1,25 @@
 """Putting things into a world so that nothing collides during a clip.
 
-Every thing has a ground footprint, an axis-aligned rectangle at each instant of the clip. A thing
-is placed only where its footprint stays off the ego vehicle's and off every other thing's.
+Every thing has a ground footprint, a rectangle at each instant of the clip. A thing is placed only
+where its footprint stays off the ego vehicle's and off every other thing's.
+
+A site is told along a straight road: x along it, y across. When all is placed, the site is bent
+along the road as it really runs, so that layouts need not know its bends.
 """
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterator
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
 
 from shotenv.config import Family
 from shotenv.world.geometry import meshes
+from shotenv.world.geometry.materials import Material
 from shotenv.world.geometry.model import (
-    MAX_LAMPS,
     Indoor,
     Lamp,
     Light,
@@ -21,7 +27,17 @@ from shotenv.world.geometry.model import (
     MovingObject,
     World,
 )
-from shotenv.world.geometry.motion import Motion, Pose
+from shotenv.world.geometry.motion import Motion, Pose, rotation
+from shotenv.world.geometry.road import (
+    LONGEST_RIGID_M,
+    STRAIGHT,
+    Along,
+    Curve,
+    bent_mesh,
+    bent_points,
+    bent_pose,
+    is_own_ground,
+)
 from shotenv.world.geometry.weather import DRY, Weather, weathered
 from unwrap.support import Range
 
@@ -33,12 +49,18 @@ HEADROOM_M = 2.0
 """Only what is lower than this can be run into: crowns may hang over a road."""
 EGO_AHEAD_M = 0.5
 """Nothing is put closer to the camera than this along the road."""
+EGO_BEHIND_M = 3.5
+"""Rear of the ego vehicle, behind its camera: it swings out when a car turns or goes backwards."""
 EGO_BESIDE_M = 1.1
 """Half the width of the ego vehicle, with its mirrors."""
 GAP_M = 0.15
 """Between any two things, so that no faces touch."""
 MAX_TRIANGLES = 6000
-"""Things are left out once a world has as many: what moves is posed and built for every frame."""
+"""Things are left out once a stretch of the road has as many."""
+STRETCH_M = 60.0
+"""Length of such a stretch: about what is seen at once."""
+GROUND_REACH_M = 120.0
+"""How far the ground reaches beyond the road, to all sides."""
 
 
 class Site:
@@ -47,20 +69,35 @@ class Site:
     Parameters
     ----------
     ego : Motion
-        Path of the camera.
+        Path of the camera, told along the road.
     duration_s : float
         Length of the clip.
     night : bool
         Lamps of streets, windows and cars are on.
     weather : Weather
         What rain and snow have done to everything that stands still.
+    road : Curve
+        How the road runs on which x = 0, y = 0 is the place of the ego at time 0.
+
+    Attributes
+    ----------
+    travel_m : float
+        How far along the road the ego gets.
     """
 
-    def __init__(self, ego: Motion, duration_s: float, night: bool = False, weather: Weather = DRY):
+    def __init__(
+        self,
+        ego: Motion,
+        duration_s: float,
+        night: bool = False,
+        weather: Weather = DRY,
+        road: Curve = STRAIGHT,
+    ):
         self.ego = ego
         self.duration_s = duration_s
         self.night = night
         self.weather = weather
+        self.road = road
         instants = int(np.clip(np.ceil(duration_s / STEP_S), 2, MAX_INSTANTS))
         self.times = np.linspace(0.0, duration_s, instants)
         self.static: list[Mesh] = []
@@ -69,31 +106,56 @@ class Site:
         self.indoor: Indoor | None = None
         self.room = np.array([[-np.inf, -np.inf], [np.inf, np.inf]])
         self.ceiling_m = np.inf
-        way = np.array([ego.at(time).position_m[:2] for time in self.times])
-        self.travel_m = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+        way = [ego.at(time) for time in self.times]
+        self.travel_m = max(pose.position_m[0] for pose in way)
         # The ego is the first to take ground, so that nothing can be put in its way.
-        margin = np.array([EGO_AHEAD_M, EGO_BESIDE_M])
-        self._taken = [np.stack([way - margin, way + margin], axis=1)]
-        self._triangles = 0
+        x, y = (-EGO_BEHIND_M, EGO_AHEAD_M), (-EGO_BESIDE_M, EGO_BESIDE_M)
+        self._moving_ground = [rectangles(x, y, way)]
+        self._standing_ground = [np.empty((0, 2, 2))]
+        self._triangles: Counter[int] = Counter()
+        # Beside each of `static`: where along the road it stands as a rigid thing, NaN for what
+        # bends with the road, infinity for what is told in the world and stays as it is.
+        self._anchors_m: list[float] = []
 
     def enclose(self, x: Range, y: Range, ceiling_m: float) -> None:
         """From now on keep things inside a rectangle and under a ceiling."""
         self.room, self.ceiling_m = np.array([x, y]).T, ceiling_m
 
-    def build(self, mesh: Mesh, sheltered: bool = False) -> None:
+    def stretches(self) -> Iterator[Site]:
+        """The site as it is for what is put near the end of each stretch of the way.
+
+        What is put by `travel_m`, such as people ahead of where the ego will be, comes once for
+        each: a drive of 300 m meets as many people in a minute as one of 30 m.
+        """
+        count = max(1, round(self.travel_m / STRETCH_M))
+        for end in self.travel_m * np.arange(1, count + 1) / count:
+            # A shallow copy: what is put there is put here.
+            part = copy(self)
+            part.travel_m = float(end)
+            yield part
+
+    def build(self, mesh: Mesh, sheltered: bool = False, straight: bool = False) -> None:
         """Add ground, ceilings and other things that nothing can run into.
 
-        Rain and snow leave what is `sheltered` as it is, such as the track of many wheels.
+        Rain and snow leave what is `sheltered` as it is, such as the track of many wheels. What is
+        `straight` is told in the world's axes and does not bend with the road.
         """
-        self._triangles += len(mesh.corners)
-        self.static.append(mesh if sheltered else weathered(mesh, self.weather))
+        self._add(mesh if sheltered else weathered(mesh, self.weather), straight)
+
+    def build_ground(self, material: Material, z: float = 0.0) -> None:
+        """Level ground under everything, as far as one can see from anywhere on the way."""
+        along = np.arange(-GROUND_REACH_M / 2, self.travel_m + GROUND_REACH_M / 2, 2.0)
+        x, y, _ = self.road.at(along)
+        reach = GROUND_REACH_M
+        sides = [(float(v.min() - reach), float(v.max() + reach)) for v in (x, y)]
+        self.build(meshes.patch(sides[0], sides[1], z, material), straight=True)
 
     def put(self, mesh: Mesh, x: float, y: float, yaw: float = 0.0, z: float = 0.0) -> bool:
         """Stand a thing at (x, y) on a floor of height `z`; false if there is no room."""
         pose = Pose((x, y, z), yaw)
         free = self._claim(mesh, [pose])
         if free:
-            self.static.append(weathered(meshes.place(mesh, pose), self.weather))
+            self._add(weathered(meshes.place(mesh, pose), self.weather), counts=False)
         return free
 
     def put_moving(self, mesh: Mesh, motion: Motion) -> bool:
@@ -108,34 +170,69 @@ class Site:
         return free
 
     def world(self, family: Family, seed: int, light: Light) -> World:
-        """The finished world; the nearest lamps are kept if there are too many."""
-        nearest = sorted((*light.lamps, *self.lamps), key=self._lamp_order)
-        light = replace(light, lamps=tuple(nearest[:MAX_LAMPS]), indoor=self.indoor)
-        return World(family, seed, meshes.join(self.static), tuple(self.moving), light, self.ego)
+        """The finished world, bent along its road."""
+        lamps = [self._bent_lamp(lamp) for lamp in (*light.lamps, *self.lamps)]
+        light = replace(light, lamps=tuple(lamps), indoor=self.indoor)
+        static, moving, ego = meshes.join(self.static), tuple(self.moving), self.ego
+        if self.road.knots:
+            anchors = np.repeat(self._anchors_m, [len(mesh.corners) for mesh in self.static])
+            static = bent_mesh(self.road, static, anchors)
+            moving = tuple(
+                MovingObject(thing.mesh, Along(thing.motion, self.road)) for thing in moving
+            )
+            ego = Along(ego, self.road)
+        return World(family, seed, static, moving, light, ego)
 
-    def _lamp_order(self, lamp: Lamp) -> tuple[bool, float]:
-        """Lamps that ride with the camera first, then by distance halfway through the clip."""
-        place = lamp.position_m
-        if lamp.carrier is not None:
-            place = self.moving[lamp.carrier].motion.at(self.duration_s / 2).position_m
-        # The camera looks ahead: lamps a little before it light more of what it sees.
-        away = np.subtract(place, (self.travel_m / 2 + 4.0, 0.0, 0.0))
-        return not lamp.rides, float(np.linalg.norm(away))
+    def _bent_lamp(self, lamp: Lamp) -> Lamp:
+        """A lamp where the road leads it; one that is carried is told in its carrier's axes."""
+        if lamp.carrier is not None or not self.road.knots:
+            return lamp
+        pose = bent_pose(self.road, Pose(lamp.position_m))
+        x, y, z = rotation(Pose((0.0, 0.0, 0.0), pose.yaw_rad)) @ lamp.direction
+        return replace(lamp, position_m=pose.position_m, direction=(float(x), float(y), float(z)))
+
+    def _add(self, mesh: Mesh, straight: bool = False, counts: bool = True) -> None:
+        """Take a mesh, placed along the road, into the site."""
+        along = mesh.corners[..., 0]
+        low, high = float(along.min()), float(along.max())
+        middle = (low + high) / 2
+        self.static.append(mesh)
+        rigid = middle if high - low <= LONGEST_RIGID_M else np.nan
+        self._anchors_m.append(np.inf if straight else rigid)
+        if counts:
+            self._triangles[int(middle // STRETCH_M)] += len(mesh.corners)
 
     def _claim(self, mesh: Mesh, poses: list[Pose]) -> bool:
         """Take the ground under a thing at one pose, or at one per instant; false if not free."""
         taken = footprints(mesh, poses)
         inside = (taken[:, 0] >= self.room[0]).all() and (taken[:, 1] <= self.room[1]).all()
         low_enough = poses[0].position_m[2] + mesh.corners[..., 2].max() < self.ceiling_m
-        affordable = self._triangles + len(mesh.corners) <= MAX_TRIANGLES
-        if not (inside and low_enough and affordable):
+        stretch = int(poses[0].position_m[0] // STRETCH_M)
+        affordable = self._triangles[stretch] + len(mesh.corners) <= MAX_TRIANGLES
+        if not (inside and low_enough and affordable and self._is_own_ground(taken)):
             return False
-        if any(overlap(taken, other) for other in self._taken):
+        if any(overlap(taken, other) for other in self._moving_ground):
+            return False
+        standing = self._standing_ground[0]
+        # Only what the whole way comes near has to be compared at each instant.
+        hull = np.stack([taken[:, 0].min(axis=0), taken[:, 1].max(axis=0)])[None]
+        if any(overlap(taken, standing[i : i + 1]) for i in np.flatnonzero(near(hull, standing))):
             return False
         # Whoever comes first has the ground: later things see it as taken, at each instant.
-        self._taken.append(taken)
-        self._triangles += len(mesh.corners)
+        if len(poses) == 1:
+            self._standing_ground[0] = np.concatenate([standing, taken])
+        else:
+            self._moving_ground.append(taken)
+        self._triangles[stretch] += len(mesh.corners)
         return True
+
+    def _is_own_ground(self, taken: np.ndarray) -> bool:
+        """Whether all corners of footprints [T, 2, 2] are nearest to their own part of the road."""
+        if not self.road.knots:
+            return True
+        corners = taken[:, [0, 0, 1, 1], 0], taken[:, [0, 1, 0, 1], 1]
+        points = np.stack([*(c.ravel() for c in corners), np.zeros(4 * len(taken))], axis=1)
+        return bool(is_own_ground(self.road, points, bent_points(self.road, points)).all())
 
 
 def footprints(mesh: Mesh, poses: list[Pose]) -> np.ndarray:
@@ -143,7 +240,12 @@ def footprints(mesh: Mesh, poses: list[Pose]) -> np.ndarray:
     points = mesh.corners.reshape(-1, 3).astype(np.float64)
     points = points[points[:, 2] < HEADROOM_M, :2]
     (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
-    outline = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    return rectangles((x0, x1), (y0, y1), poses)
+
+
+def rectangles(x: Range, y: Range, poses: list[Pose]) -> np.ndarray:
+    """Rectangles [T, 2, 2] ((low, high), (x, y)) about a turned one, at each of T poses."""
+    outline = np.array([(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])])
     yaw = np.array([pose.yaw_rad for pose in poses])
     # Transposed, so that rows of points are turned: outline @ turn.
     turn = np.moveaxis(np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]]), -1, 0)
@@ -151,9 +253,14 @@ def footprints(mesh: Mesh, poses: list[Pose]) -> np.ndarray:
     return np.stack([placed.min(axis=1), placed.max(axis=1)], axis=1)
 
 
-def overlap(a: np.ndarray, b: np.ndarray) -> bool:
-    """Whether two footprints come closer than a gap at any instant; static ones have T = 1."""
-    # Rectangles are apart if they are so along either axis; one that stands still is compared with
-    # each instant of the other by broadcasting.
+def near(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Whether rectangles come closer than a gap, bool [T]; one that stands still has T = 1."""
+    # Apart along either axis is apart; what stands still is compared with each instant by
+    # broadcasting.
     apart = (a[:, 0] > b[:, 1] + GAP_M) | (b[:, 0] > a[:, 1] + GAP_M)
-    return bool((~apart.any(axis=1)).any())
+    return ~apart.any(axis=1)
+
+
+def overlap(a: np.ndarray, b: np.ndarray) -> bool:
+    """Whether two footprints come closer than a gap at any instant."""
+    return bool(near(a, b).any())
