@@ -75,9 +75,9 @@ def draw_ego(
     if place.parks and low == 0:
         profile, way = draw_parking(rng, place.speed_m_s, limits, duration_s)
         return Drive(profile, way, height, pitch, body), Curve()
-    corners = place.corner_m is not None and rng.random() < place.corner_share
-    if corners and low**2 <= CORNERING_M_S2 * place.corner_m[0]:
-        profile, road = draw_corner(rng, place.corner_m, place.speed_m_s, limits, duration_s)
+    corner_m = place.corner_m if rng.random() < place.corner_share else None
+    if corner_m is not None and low**2 <= CORNERING_M_S2 * corner_m[0]:
+        profile, road = draw_corner(rng, corner_m, place.speed_m_s, limits, duration_s)
     else:
         profile = draw_profile(rng, place.speed_m_s, limits, duration_s)
         road = draw_bends(rng, place.bend_m, profile, duration_s)
@@ -91,11 +91,14 @@ def draw_body(rng: np.random.Generator, roughness: float) -> Body:
     `roughness` is 1 on asphalt and more on bare ground.
     """
     tones = []
-    for frequency in np.exp(rng.uniform(*np.log(TONES_HZ), 6)):
+    for _ in range(6):
+        frequency = m.log_uniform(rng, TONES_HZ)
         # Slow swings are wide and fast ones small: amplitudes fall as one over the frequency.
         scale = roughness * rng.uniform(0.4, 1.6) / (1.0 + 0.3 * frequency)
-        swing = scale * np.array([2e-3, 1.5e-3, 1e-3]) * rng.uniform(0.5, 1.0, 3)
-        tones.append((float(frequency), *map(float, swing), float(rng.uniform(0.0, math.tau))))
+        heave, pitch, roll = (
+            float(scale * most * rng.uniform(0.5, 1.0)) for most in (2e-3, 1.5e-3, 1e-3)
+        )
+        tones.append((frequency, heave, pitch, roll, float(rng.uniform(0.0, math.tau))))
     return Body(float(rng.uniform(*NOD_RAD_S2_M)), tuple(tones))
 
 

@@ -20,14 +20,15 @@ def lay_out_construction_site(site: Site, rng: np.random.Generator) -> None:
     """A haul road over bare ground between fences, machines, heaps and an unfinished building."""
     ground = (m.SOIL if rng.random() < 0.6 else m.GRAVEL).draw(rng)
     far, half = site.travel_m + REACH_M, rng.uniform(2.6, 4.2)
-    site.build(meshes.patch((-BEHIND_M, far), (-REACH_M, REACH_M), 0.0, ground))
+    site.build_ground(ground)
     track = m.GRAVEL.draw(rng)
     site.build(meshes.patch((-BEHIND_M, far), (-half, half), 0.004, track))
     build_puddles(site, rng, (-half, half))
     if rng.random() < 0.5:
         put_blockage(site, rng)
-    put_machines(site, rng, half)
-    put_crew(site, rng, half)
+    for part in site.stretches():
+        put_machines(part, rng, half)
+        put_crew(part, rng, half)
     # The building stands on one side of the road, and the fence on the other.
     side = rng.choice([-1, 1])
     inwards = -side * np.pi / 2

@@ -12,21 +12,21 @@ from shotenv.world.things import cycles, plants
 
 def lay_out_forest_path(site: Site, rng: np.random.Generator) -> None:
     """A winding strip of trodden soil under trees, perhaps blocked by a fallen trunk."""
-    half, far = rng.uniform(0.9, 1.6), site.travel_m + REACH_M
-    litter = (m.LEAF_LITTER if rng.random() < 0.6 else m.GRASS).draw(rng)
-    site.build(meshes.patch((-BEHIND_M, far), (-REACH_M, REACH_M), 0.0, litter))
+    half = rng.uniform(0.9, 1.6)
+    site.build_ground((m.LEAF_LITTER if rng.random() < 0.6 else m.GRASS).draw(rng))
     build_trodden_strip(site, rng, half)
     build_puddles(site, rng, (-1.5, 1.5))
     if rng.random() < 0.45:
         # The power favours short distances, and most obstacles of the near field are close.
         x = site.travel_m + 1.5 + 7.0 * rng.uniform() ** 1.5
         site.put(fallen_tree(rng), x, rng.uniform(-1.0, 1.0), rng.uniform(1.2, 1.9))
-    put_walkers(site, rng, (0, 3), (-half + 0.2, half - 0.2), 0.004)
-    if rng.random() < 0.3:
-        x, speed = site.travel_m + rng.uniform(5.0, 14.0), rng.uniform(2.0, 6.0)
-        path = Arc(Pose((x, 0.4 * half, 0.004), np.pi), speed)
-        site.put_moving(cycles.cyclist(rng), path)
-    put_deer(site, rng, half)
+    for part in site.stretches():
+        put_walkers(part, rng, (0, 3), (-half + 0.2, half - 0.2), 0.004)
+        if rng.random() < 0.3:
+            x, speed = part.travel_m + rng.uniform(5.0, 14.0), rng.uniform(2.0, 6.0)
+            path = Arc(Pose((x, 0.4 * half, 0.004), np.pi), speed)
+            part.put_moving(cycles.cyclist(rng), path)
+        put_deer(part, rng, half)
     # The further off, the sparser and the coarser: what is behind is mostly hidden.
     for side in (-1, 1):
         edge = side * (half + 0.5)

@@ -87,7 +87,7 @@ def open_places(country: float, town: float, park: float) -> tuple[Place, ...]:
     """Country roads, town streets and car parks with these shares."""
     return (
         Place(roads.lay_out_country_road, (2.0, 15.0), country, bend_m=(60.0, 400.0)),
-        Place(roads.lay_out_town_street, (0.5, 10.0), town, (80.0, 400.0), (11.0, 16.0), 0.3),
+        Place(roads.lay_out_town_street, (0.5, 10.0), town, (80.0, 400.0), (13.0, 18.0), 0.3),
         Place(roads.lay_out_car_park, (0.0, 2.0), park, parks=True),
     )
 

@@ -23,18 +23,19 @@ from shotenv.world.things import cab, nose_lamps, people, plants, vehicles, whee
 
 def lay_out_snowy_street(site: Site, rng: np.random.Generator) -> None:
     """A cleared lane between banks of snow, chalets, snowed-in cars and trees."""
-    half, far = rng.uniform(2.4, 3.4), site.travel_m + REACH_M
-    site.build(meshes.patch((-BEHIND_M, far), (-REACH_M, REACH_M), 0.0, m.SNOW.draw(rng)))
+    half = rng.uniform(2.4, 3.4)
+    site.build_ground(m.SNOW.draw(rng))
     build_wheel_tracks(site, rng)
     put_vehicle_ahead(site, rng)
-    if rng.random() < 0.5:
-        x, lane = rng.uniform(8.0, 24.0) + 0.5 * site.travel_m, rng.uniform(0.5, 0.9) * half
-        draw = snow_plough if rng.random() < 0.6 else vehicles.traffic
-        put_approaching(site, rng, Arc(Pose((x, lane, 0.0), np.pi), rng.uniform(2.0, 8.0)), draw)
-    put_crossers(site, rng, (-half, half))
-    for _ in range(rng.integers(0, 3)):
-        put_sledge(site, rng, half)
-    put_walkers(site, rng, (0, 3), (-half + 0.3, half - 0.3))
+    for part in site.stretches():
+        if rng.random() < 0.5:
+            x, lane = rng.uniform(8.0, 24.0) + 0.5 * part.travel_m, rng.uniform(0.5, 0.9) * half
+            draw, path = vehicles.traffic, Arc(Pose((x, lane, 0.0), np.pi), rng.uniform(2.0, 8.0))
+            put_approaching(part, rng, path, snow_plough if rng.random() < 0.6 else draw)
+        put_crossers(part, rng, (-half, half))
+        for _ in range(rng.integers(0, 3)):
+            put_sledge(part, rng, half)
+        put_walkers(part, rng, (0, 3), (-half + 0.3, half - 0.3))
     if rng.random() < 0.4:
         x = site.travel_m + 1.0 + 6.0 * rng.uniform() ** 1.5
         blocking = draw_one(rng, (snow_bank, snowman))

@@ -113,7 +113,7 @@ def _arc(x, y, heading, curvature, following, gear, step):
 
 
 @dataclass(frozen=True)
-class Along:
+class Bent:
     """A motion that is told along a straight road, on the bent one."""
 
     motion: Motion
@@ -232,8 +232,9 @@ def _halves(mesh: Mesh, at: np.ndarray) -> Mesh:
     ab, ac = meeting(b), meeting(c)
     faces = np.concatenate([np.stack(f, 1) for f in ((a, ab, ac), (ab, b, c), (ab, c, ac))])
     corners = faces[..., :3].astype(np.float32)
-    thrice = {n: np.tile(getattr(mesh, n), 3) for n in _ARRAYS if n not in ("corners", "uv")}
-    pieces = Mesh(corners=corners, uv=faces[..., 3:].astype(np.float32), **thrice)
+    arrays = {n: np.tile(getattr(mesh, n), 3) for n in _ARRAYS if n not in ("corners", "uv")}
+    arrays |= {"corners": corners, "uv": faces[..., 3:].astype(np.float32)}
+    pieces = Mesh(**arrays, kinds=mesh.kinds)
     # Where a corner lies on the cut, one of the three has no area.
     return _of(pieces, np.linalg.norm(area_vectors(corners.astype(np.float64)), axis=1) > 1e-9)
 
@@ -243,10 +244,10 @@ _ARRAYS = [field.name for field in fields(Mesh) if field.name != "kinds"]
 
 def _of(mesh: Mesh, faces: np.ndarray) -> Mesh:
     """The faces of a mesh that a mask picks."""
-    return replace(mesh, **{name: getattr(mesh, name)[faces] for name in _ARRAYS})
+    return Mesh(**{name: getattr(mesh, name)[faces] for name in _ARRAYS}, kinds=mesh.kinds)
 
 
 def _beside(first: Mesh, second: Mesh) -> Mesh:
     """The faces of two meshes, of the kinds of the first."""
-    both = {n: np.concatenate([getattr(first, n), getattr(second, n)]) for n in _ARRAYS}
-    return replace(first, **both)
+    arrays = {n: np.concatenate([getattr(first, n), getattr(second, n)]) for n in _ARRAYS}
+    return Mesh(**arrays, kinds=first.kinds)

@@ -31,7 +31,7 @@ from shotenv.world.geometry.motion import Motion, Pose, rotation
 from shotenv.world.geometry.road import (
     LONGEST_RIGID_M,
     STRAIGHT,
-    Along,
+    Bent,
     Curve,
     bent_mesh,
     bent_points,
@@ -83,6 +83,9 @@ class Site:
     ----------
     travel_m : float
         How far along the road the ego gets.
+    taken : list of float64 [T, 2, 2]
+        Ground rectangles that are not free: first those of all T things that stand, then those of
+        each thing that moves at T instants, the ego before all others.
     """
 
     def __init__(
@@ -110,8 +113,7 @@ class Site:
         self.travel_m = max(pose.position_m[0] for pose in way)
         # The ego is the first to take ground, so that nothing can be put in its way.
         x, y = (-EGO_BEHIND_M, EGO_AHEAD_M), (-EGO_BESIDE_M, EGO_BESIDE_M)
-        self._moving_ground = [rectangles(x, y, way)]
-        self._standing_ground = [np.empty((0, 2, 2))]
+        self.taken = [np.empty((0, 2, 2)), rectangles(x, y, way)]
         self._triangles: Counter[int] = Counter()
         # Beside each of `static`: where along the road it stands as a rigid thing, NaN for what
         # bends with the road, infinity for what is told in the world and stays as it is.
@@ -140,7 +142,12 @@ class Site:
         Rain and snow leave what is `sheltered` as it is, such as the track of many wheels. What is
         `straight` is told in the world's axes and does not bend with the road.
         """
-        self._add(mesh if sheltered else weathered(mesh, self.weather), straight)
+        x, y = mesh.corners[..., 0], mesh.corners[..., 1]
+        under = np.array([[[x.min(), y.min()], [x.max(), y.max()]]], np.float64)
+        # What bends with the road is cut off where it leaves its ground, not left out.
+        bends = float(np.ptp(x)) > LONGEST_RIGID_M
+        if straight or bends or self._is_own_ground(under):
+            self._add(mesh if sheltered else weathered(mesh, self.weather), straight)
 
     def build_ground(self, material: Material, z: float = 0.0) -> None:
         """Level ground under everything, as far as one can see from anywhere on the way."""
@@ -153,7 +160,7 @@ class Site:
     def put(self, mesh: Mesh, x: float, y: float, yaw: float = 0.0, z: float = 0.0) -> bool:
         """Stand a thing at (x, y) on a floor of height `z`; false if there is no room."""
         pose = Pose((x, y, z), yaw)
-        free = self._claim(mesh, [pose])
+        free = self._claim(mesh.corners.reshape(-1, 3), len(mesh.corners), [pose])
         if free:
             self._add(weathered(meshes.place(mesh, pose), self.weather), counts=False)
         return free
@@ -164,7 +171,8 @@ class Site:
         What moves stays dry and bare: rain and snow lie on what stands still.
         """
         mesh = meshes.grounded(mesh)
-        free = self._claim(mesh, [motion.at(time) for time in self.times])
+        poses = [motion.at(time) for time in self.times]
+        free = self._claim(mesh.corners.reshape(-1, 3), len(mesh.corners), poses)
         if free:
             self.moving.append(MovingObject(mesh, motion))
         return free
@@ -178,9 +186,9 @@ class Site:
             anchors = np.repeat(self._anchors_m, [len(mesh.corners) for mesh in self.static])
             static = bent_mesh(self.road, static, anchors)
             moving = tuple(
-                MovingObject(thing.mesh, Along(thing.motion, self.road)) for thing in moving
+                MovingObject(thing.mesh, Bent(thing.motion, self.road)) for thing in moving
             )
-            ego = Along(ego, self.road)
+            ego = Bent(ego, self.road)
         return World(family, seed, static, moving, light, ego)
 
     def _bent_lamp(self, lamp: Lamp) -> Lamp:
@@ -202,28 +210,31 @@ class Site:
         if counts:
             self._triangles[int(middle // STRETCH_M)] += len(mesh.corners)
 
-    def _claim(self, mesh: Mesh, poses: list[Pose]) -> bool:
-        """Take the ground under a thing at one pose, or at one per instant; false if not free."""
-        taken = footprints(mesh, poses)
+    def _claim(self, points: np.ndarray, faces: int, poses: list[Pose]) -> bool:
+        """Take the ground under points [N, 3] of a thing of so many faces; false if not free.
+
+        The thing stands at one pose or is at one for each instant.
+        """
+        taken = footprints(points, poses)
         inside = (taken[:, 0] >= self.room[0]).all() and (taken[:, 1] <= self.room[1]).all()
-        low_enough = poses[0].position_m[2] + mesh.corners[..., 2].max() < self.ceiling_m
+        low_enough = poses[0].position_m[2] + points[:, 2].max() < self.ceiling_m
         stretch = int(poses[0].position_m[0] // STRETCH_M)
-        affordable = self._triangles[stretch] + len(mesh.corners) <= MAX_TRIANGLES
+        affordable = self._triangles[stretch] + faces <= MAX_TRIANGLES
         if not (inside and low_enough and affordable and self._is_own_ground(taken)):
             return False
-        if any(overlap(taken, other) for other in self._moving_ground):
+        if any(overlap(taken, other) for other in self.taken[1:]):
             return False
-        standing = self._standing_ground[0]
-        # Only what the whole way comes near has to be compared at each instant.
+        # Of what stands, only what the whole way comes near has to be compared at each instant.
+        standing = self.taken[0]
         hull = np.stack([taken[:, 0].min(axis=0), taken[:, 1].max(axis=0)])[None]
         if any(overlap(taken, standing[i : i + 1]) for i in np.flatnonzero(near(hull, standing))):
             return False
         # Whoever comes first has the ground: later things see it as taken, at each instant.
         if len(poses) == 1:
-            self._standing_ground[0] = np.concatenate([standing, taken])
+            self.taken[0] = np.concatenate([standing, taken])
         else:
-            self._moving_ground.append(taken)
-        self._triangles[stretch] += len(mesh.corners)
+            self.taken.append(taken)
+        self._triangles[stretch] += faces
         return True
 
     def _is_own_ground(self, taken: np.ndarray) -> bool:
@@ -235,9 +246,9 @@ class Site:
         return bool(is_own_ground(self.road, points, bent_points(self.road, points)).all())
 
 
-def footprints(mesh: Mesh, poses: list[Pose]) -> np.ndarray:
-    """Ground rectangles [T, 2, 2] ((low, high), (x, y)) of what is below the headroom."""
-    points = mesh.corners.reshape(-1, 3).astype(np.float64)
+def footprints(points: np.ndarray, poses: list[Pose]) -> np.ndarray:
+    """Ground rectangles [T, 2, 2] ((low, high), (x, y)) of points [N, 3] below the headroom."""
+    points = points.astype(np.float64)
     points = points[points[:, 2] < HEADROOM_M, :2]
     (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
     return rectangles((x0, x1), (y0, y1), poses)
@@ -258,7 +269,8 @@ def near(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     # Apart along either axis is apart; what stands still is compared with each instant by
     # broadcasting.
     apart = (a[:, 0] > b[:, 1] + GAP_M) | (b[:, 0] > a[:, 1] + GAP_M)
-    return ~apart.any(axis=1)
+    result: np.ndarray = np.logical_not(apart.any(axis=1))
+    return result
 
 
 def overlap(a: np.ndarray, b: np.ndarray) -> bool:
