@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shotenv.config import Family
-from shotenv.world.families import construction, enclosed, forest, roads, snow, warehouse
+from shotenv.world.families import construction, forest, garage, roads, snow, tunnel, warehouse
 from shotenv.world.geometry import Light, Site, lights
 from unwrap.support import Range
 
@@ -99,10 +99,10 @@ SETTINGS: dict[Family, Setting] = {
         open_places(0.10, 0.60, 0.30), lights.overcast, wet_share=0.40, snow_share=0.12
     ),
     "garage": Setting(
-        (Place(enclosed.lay_out_garage, (0.0, 4.0), 1.0, None, (6.0, 7.5), 0.35),), lights.overcast
+        (Place(garage.lay_out_garage, (0.0, 4.0), 1.0, None, (6.0, 7.5), 0.35),), lights.overcast
     ),
     "tunnel": Setting(
-        (Place(enclosed.lay_out_tunnel, (2.0, 15.0), 1.0),), sun_night_or_clouds(0.6, 0.3)
+        (Place(tunnel.lay_out_tunnel, (2.0, 15.0), 1.0),), sun_night_or_clouds(0.6, 0.3)
     ),
     "night_road": Setting(
         open_places(0.40, 0.35, 0.25), lights.night, wet_share=0.40, snow_share=0.08

@@ -81,7 +81,7 @@ class Lamp:
 
 @dataclass(frozen=True)
 class Indoor:
-    """A roofed box that daylight enters through one opening at most, at its far end.
+    """A roofed box that daylight enters through openings at its ends, one at each at most.
 
     Renderers aim at the opening: daylight that has to find it by chance is noise.
 
@@ -91,11 +91,14 @@ class Indoor:
         Corners of the box, metres.
     opening : ((y, z), (y, z)) or None
         Lower and upper corner of the opening in the plane x = high[0].
+    entrance : ((y, z), (y, z)) or None
+        The same in the plane x = low[0].
     """
 
     low: tuple[float, float, float]
     high: tuple[float, float, float]
     opening: tuple[tuple[float, float], tuple[float, float]] | None
+    entrance: tuple[tuple[float, float], tuple[float, float]] | None = None
 
 
 @dataclass(frozen=True)
@@ -111,7 +114,7 @@ class Light:
     sky_zenith, sky_horizon : float
         Sky radiance overhead and at the horizon, W m-2 sr-1, linear in the sine of elevation.
     lamps : tuple of Lamp
-        At most `MAX_LAMPS`.
+        Any number; at an instant `MAX_LAMPS` of them shine.
     indoor : Indoor or None
         The roofed part of the world, if any.
     """
@@ -125,7 +128,8 @@ class Light:
 
 
 MAX_LAMPS = 16
-"""Most lamps of a world: renderers keep a table of this length, so that one kernel fits all."""
+"""Most lamps at an instant, those nearest to the camera: renderers keep a table of this length, so
+that one kernel fits all."""
 
 
 @dataclass(frozen=True)
