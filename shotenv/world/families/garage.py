@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shotenv.world.families.roads import BEHIND_M, PAINT_M, REACH_M
+from shotenv.world.families.roads import BEHIND_M, PAINT_M, REACH_M, UNDER_ROAD_M
 from shotenv.world.families.traffic import (
     draw_one,
     put_approaching,
@@ -171,7 +171,9 @@ def put_gate(
 def lay_out_yard(site: Site, rng: np.random.Generator, x: Range) -> None:
     """Paved ground before a gate, with cars, bins, trees and walls around."""
     ground = (m.ASPHALT if rng.random() < 0.6 else m.PAVING).draw(rng)
-    site.build(meshes.patch(x, (-REACH_M, REACH_M), -0.01, ground), straight=True)
+    # Under the hall's floor by a step, so that nothing is seen between the two.
+    under = (x[0], x[1] + 0.5) if x[0] < -1.0 else (x[0] - 0.5, x[1])
+    site.build(meshes.patch(under, (-REACH_M, REACH_M), UNDER_ROAD_M, ground), straight=True)
     # Under the open sky again, and on the yard alone.
     site.enclose((x[0], x[1] - 0.3) if x[0] < -1.0 else (x[0] + 0.5, x[1]), (-25.0, 25.0), np.inf)
     near = x[0] if x[0] > -1.0 else x[1] - 20.0

@@ -113,6 +113,13 @@ def lay_out_car_park(site: Site, rng: np.random.Generator) -> None:
     end = site.travel_m + 0.7 + 5.0 * rng.uniform() ** 1.5
     paint_bays(site, rng, end, rng.uniform(2.5, 2.9))
     build_puddles(site, rng, (-5.0, 5.0))
+    # Walls, hedges and houses all around: who turns looks to every side.
+    for side in (-1, 1):
+        for x in np.arange(end - 28.0, end + 25.0, 13.0):
+            if rng.random() < 0.7:
+                site.put(backdrop(rng), x, side * rng.uniform(13.0, 20.0), -side * np.pi / 2)
+    for y in (-14.0, 0.0, 14.0):
+        site.put(backdrop(rng), end - rng.uniform(32.0, 38.0), y)
     ahead = rng.random()
     if ahead < 0.35:
         car, facing = vehicles.car(rng), np.pi if rng.random() < 0.5 else 0.0
@@ -123,7 +130,7 @@ def lay_out_car_park(site: Site, rng: np.random.Generator) -> None:
         site.put(backdrop(rng), end, rng.uniform(-2, 2), np.pi)
     # Beside the ego, beyond what it faces, and behind it, where it looks when it turns.
     for x in (end - 3.0, end + 2.5, end + 8.0, end - 14.0, end - 19.5):
-        for y in (-8.1, -5.4, -2.7, 0.0, 2.7, 5.4, 8.1):
+        for y in 2.7 * np.arange(-4, 5):
             if rng.random() < 0.5:
                 site.put(
                     vehicles.parked_car(rng), x, y + rng.uniform(-0.2, 0.2), rng.integers(2) * np.pi

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shotenv.world.families.construction import passing_worker
-from shotenv.world.families.garage import Hall, build_wall, hall_over
+from shotenv.world.families.garage import Hall, build_wall, hall_over, lay_out_yard
 from shotenv.world.families.roads import PAINT_M, REACH_M
 from shotenv.world.families.traffic import draw_one, put_crossers, put_row, put_walkers
 from shotenv.world.geometry import (
@@ -63,6 +63,8 @@ def lay_out_warehouse(site: Site, rng: np.random.Generator) -> None:
     for y in np.arange(-half + 1.5, half - 1.0, 1.7):
         site.put(floor_thing(rng), end - rng.uniform(1, 2.2), y)
     build_high_bays(site, rng, end, height)
+    if leaves:
+        lay_out_yard(site, rng, (end, end + REACH_M))
 
 
 def build_hall_shell(site: Site, rng: np.random.Generator, hall: Hall, height: float) -> None:
@@ -103,6 +105,8 @@ def build_docks(
         site.build(door, straight=True)
     lintel = meshes.box((0.3, width, height - high), wall, (end + 0.15, 0.0, high))
     site.build(lintel, straight=True)
+    if leaves:
+        return
     if is_open:
         yard = (end, end + REACH_M), (hall.y[0] - REACH_M, hall.y[1] + REACH_M)
         # A little lower, so that it does not lie in one plane with the floor at the threshold.

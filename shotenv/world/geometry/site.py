@@ -55,7 +55,7 @@ EGO_BESIDE_M = 1.1
 """Half the width of the ego vehicle, with its mirrors."""
 GAP_M = 0.15
 """Between any two things, so that no faces touch."""
-MAX_TRIANGLES = 6000
+MAX_TRIANGLES = 8000
 """Things are left out once a stretch of the road has as many."""
 STRETCH_M = 60.0
 """Length of such a stretch: about what is seen at once."""
