@@ -41,6 +41,8 @@ GATE_M = 4.2
 """Width of a gate that the ego drives through."""
 PARAPET_M = 1.2
 """How far a garage's outer wall stands above its ceiling."""
+YARD_M = 20.0
+"""Longest way that the ego drives outside a hall."""
 CLEAR_OF_GATE_M = 4.0
 """Least distance to the gate that a drive comes in by."""
 Opening = tuple[tuple[float, float], tuple[float, float]] | None
@@ -65,10 +67,11 @@ def lay_out_garage(site: Site, rng: np.random.Generator) -> None:
     enters = through < 0.2 and site.travel_m > 3.0 and not site.road.knots
     leaves = 0.2 < through < 0.4 and site.travel_m > 3.0 and not site.road.knots
     if enters:
-        start = site.travel_m * rng.uniform(0.2, 0.8) + CLEAR_OF_GATE_M
+        start = min(site.travel_m * rng.uniform(0.2, 0.8), YARD_M) + CLEAR_OF_GATE_M
         end = max(end, start + 12.0)
     if leaves:
-        end, near = site.travel_m * rng.uniform(0.3, 0.9), False
+        share, near = rng.uniform(0.3, 0.9), False
+        end = max(share * site.travel_m, site.travel_m - YARD_M)
     hall = hall_over(site, start, end, half)
     build_garage_shell(site, rng, hall, height)
     gate = -GATE_M / 2, GATE_M / 2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shotenv.world.families.construction import passing_worker
-from shotenv.world.families.garage import Hall, build_wall, hall_over, lay_out_yard
+from shotenv.world.families.garage import YARD_M, Hall, build_wall, hall_over, lay_out_yard
 from shotenv.world.families.roads import PAINT_M, REACH_M
 from shotenv.world.families.traffic import draw_one, put_crossers, put_row, put_walkers
 from shotenv.world.geometry import (
@@ -44,7 +44,7 @@ def lay_out_warehouse(site: Site, rng: np.random.Generator) -> None:
     # Straight on through the open gate of a dock, into the yard.
     leaves = rng.random() < 0.25 and site.travel_m > 3.0 and not site.road.knots
     if leaves:
-        end = site.travel_m * rng.uniform(0.4, 0.9) + 0.5
+        end = max(site.travel_m * rng.uniform(0.4, 0.9), site.travel_m - YARD_M) + 0.5
     hall = hall_over(site, -12.0, end, half)
     build_hall_shell(site, rng, hall, height)
     build_docks(site, rng, hall, height, leaves)

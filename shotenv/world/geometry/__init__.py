@@ -2,7 +2,8 @@
 
 `model.py` is what renderers read; `meshes.py` has the primitives that things are built of;
 `materials.py` the near-infrared albedos; `lights.py` sun, sky and head lights; `weather.py` wet and
-snow; `site.py` the ground that is still free.
+snow; `site.py` the ground that is still free; `road.py` curves, and how a site is bent along one;
+`speed.py` and `vehicle.py` how a car drives.
 """
 
 import lazy_loader

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
-HIGHEST_SPEED_M_S = 60.0
-"""Faster than any car that a sensor of 25 m would be put on."""
+from shotenv.config import HIGHEST_SPEED_M_S
+
 HARDEST_JERK_M_S3 = 6.0
 """No change of speed is more sudden: what passengers call abrupt begins at about 5 [assumed]."""
 

@@ -15,9 +15,8 @@ from shotenv.config.bank import WorldConfig
 from shotenv.config.families import FAMILIES
 from shotenv.world.draw import draw_world
 from shotenv.world.geometry import lights, meshes
-from shotenv.world.geometry.model import MAX_LAMPS
-from shotenv.world.geometry.motion import Arc, Pose
-from shotenv.world.geometry.site import MAX_TRIANGLES, Site
+from shotenv.world.geometry.motion import Arc, Pose, ground_speed_m_s
+from shotenv.world.geometry.site import MAX_TRIANGLES, STRETCH_M, Site
 
 UNAMBIGUOUS_M = 6.2457
 
@@ -135,7 +134,6 @@ def test_light_is_physical(drawn):
         assert np.linalg.norm(light.sun_direction) == pytest.approx(1.0, abs=1e-9)
         assert 0 <= light.sun_irradiance <= lights.G173_IRRADIANCE
         assert light.sun_direction[2] >= np.sin(np.radians(2.5)) - 1e-9
-        assert len(light.lamps) <= MAX_LAMPS
         for lamp in light.lamps:
             assert lamp.intensity_w_sr > 0
             assert np.linalg.norm(lamp.direction) == pytest.approx(1.0, abs=1e-3)
@@ -159,24 +157,28 @@ def test_sun_falls_with_elevation():
     assert irradiance[-1] == pytest.approx(lights.G173_IRRADIANCE, rel=1e-3)
 
 
-def test_triangle_budget(drawn):
-    for _, world in drawn:
-        # Ground and other things that are built rather than placed may go a little over it.
-        assert len(corners_at(world, 0.0)) <= MAX_TRIANGLES + 300
+def test_triangle_budget_of_a_stretch():
+    site = Site(Arc(Pose((0.0, 0.0, 1.0)), 10.0), 12.0)
+    post = meshes.join([plain_box((0.1, 0.1, 1.0))] * 40)
+    for x in np.arange(0.5, 120.0, 0.5):
+        site.put(post, x, 3.0)
+    stands = np.array([mesh.corners[..., 0].mean() for mesh in site.static])
+    for first in (0.0, STRETCH_M):
+        count = ((stands >= first) & (stands < first + STRETCH_M)).sum()
+        # One more would have gone over it.
+        assert MAX_TRIANGLES - len(post.corners) < count * len(post.corners) <= MAX_TRIANGLES
 
 
 def test_speed_is_within_the_configuration(drawn):
-    for config, world in drawn:
-        assert config.speed_m_s[0] <= world.ego.speed_m_s <= config.speed_m_s[1]
-    fast = draw_world("garage", 0, WorldConfig(speed_m_s=(12.0, 13.0)))
-    assert 12.0 <= fast.ego.speed_m_s <= 13.0
-
-
-def test_long_clips_stay_in_their_world():
-    config = WorldConfig(frames_per_clip=256)
-    for family in EVERY:
-        world = draw_world(family, 1, config)
-        assert world.ego.speed_m_s * duration_s(config) <= 90.0 + 1e-6
+    worlds = [*drawn]
+    for limits in ((12.0, 13.0), (0.0, 1.0)):
+        config = WorldConfig(speed_m_s=limits)
+        worlds += [(config, draw_world(family, 0, config)) for family in EVERY]
+    for config, world in worlds:
+        for time in np.linspace(0.0, duration_s(config), 9):
+            speed = abs(ground_speed_m_s(world.ego, time))
+            # Within a lane the ego swings aside, on which it goes a per mille faster.
+            assert config.speed_m_s[0] * 0.99 <= speed <= config.speed_m_s[1] * 1.01
 
 
 def test_nothing_comes_near_the_camera(drawn):
@@ -190,15 +192,17 @@ def test_nothing_comes_near_the_camera(drawn):
             assert np.linalg.norm(nearest - camera, axis=1).min(initial=np.inf) > 0.4
 
 
-def test_camera_starts_at_the_origin(drawn):
+def test_camera_is_at_the_height_of_a_car(drawn):
     for _, world in drawn:
-        x, y, z = world.ego.start.position_m
-        assert (x, y) == (0.0, 0.0)
-        assert 0.6 <= z <= 1.2
+        # Vibration adds some millimetres.
+        assert 0.58 <= world.ego.at(0.0).position_m[2] <= 1.22
 
 
 def test_most_worlds_have_something_moving(drawn):
-    moving = [any(thing.motion.speed_m_s > 0 for thing in world.moving) for _, world in drawn]
+    moving = [
+        any(ground_speed_m_s(thing.motion, 0.5) > 0.1 for thing in world.moving)
+        for _, world in drawn
+    ]
     assert np.mean(moving) > 0.7
 
 
@@ -286,7 +290,7 @@ def test_site_lets_crowns_hang_over_and_rooms_end():
     [
         ("moon", 0, CLIP, "family is 'moon'"),
         ("garage", -1, CLIP, "seed is -1"),
-        ("garage", 0, WorldConfig(speed_m_s=(10, 15), frames_per_clip=256), "speed_m_s"),
+        ("garage", 0, WorldConfig(speed_m_s=(10, 15), frames_per_clip=2048), "speed_m_s"),
     ],
 )
 def test_bad_arguments_are_named(family, seed, config, named):
