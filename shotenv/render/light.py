@@ -61,7 +61,8 @@ class PassiveLight:
     """Sun, sky and lamps of a world at each instant, on the device."""
 
     def __init__(self, world: World, instants: Instants):
-        light = world.light
+        # Daylight changes little within a frame: one number for all of its instants.
+        light = world.light.at(instants.times_s[0])
         # Numbers are made opaque: Dr.Jit would compile a plain one into the kernel as a constant,
         # and every world would wait for a kernel of its own.
         self._lamps = upload(np.stack([lamp_table(world, t) for t in instants.times_s]))
@@ -250,7 +251,7 @@ def lamp_table(world: World, time_s: float) -> np.ndarray:
     for row, (index, share) in zip(table, dimmed, strict=False):
         lamp, turn, position = lamps[index]
         axis = turn @ lamp.direction
-        row[:3], row[3] = position, share * lamp.intensity_w_sr
+        row[:3], row[3] = position, share * lamp.share_on(time_s) * lamp.intensity_w_sr
         row[4:7], row[7] = axis / np.linalg.norm(axis), lamp.cutoff_cos
         row[8] = lamp.radius_m
     return table

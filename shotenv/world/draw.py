@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from shotenv.config import Family, WorldConfig
@@ -46,4 +48,8 @@ def draw_world(family: Family, seed: int, config: WorldConfig) -> World:
     # The site is laid out last: it keeps the ego's way free and reaches as far as it drives.
     site = Site(ego, duration_s, lights.is_dark(light), weather, road)
     place.lay_out(site, rng)
-    return site.world(family, seed, light)
+    falls = rng.random() < setting.dusk_share
+    world = site.world(family, seed, lights.dusk(rng, light, duration_s) if falls else light)
+    if falls:
+        world = replace(world, light=lights.switched_on(rng, world.light, duration_s))
+    return world

@@ -62,6 +62,8 @@ class Setting:
         Shares of the worlds after rain, and after snow.
     snow_cover : (low, high)
         Cover of the snowy ones: 0 is none, 1 is closed.
+    dusk_share : float
+        Share of the worlds, all of them at night, in which night only falls.
     """
 
     places: tuple[Place, ...]
@@ -69,6 +71,7 @@ class Setting:
     wet_share: float = 0.0
     snow_share: float = 0.0
     snow_cover: Range = (0.3, 0.7)
+    dusk_share: float = 0.0
 
 
 def sun_night_or_clouds(sun_share: float, low_share: float, night_share: float = 0.0) -> DrawLight:
@@ -105,7 +108,11 @@ SETTINGS: dict[Family, Setting] = {
         (Place(tunnel.lay_out_tunnel, (2.0, 15.0), 1.0),), sun_night_or_clouds(0.6, 0.3)
     ),
     "night_road": Setting(
-        open_places(0.40, 0.35, 0.25), lights.night, wet_share=0.40, snow_share=0.08
+        open_places(0.40, 0.35, 0.25),
+        lights.night,
+        wet_share=0.40,
+        snow_share=0.08,
+        dusk_share=0.15,
     ),
     # From here on held out from training: `shotenv.config.families.SHIFT_FAMILIES`.
     "warehouse": Setting(

@@ -6,7 +6,8 @@ band: irradiance W m-2, radiance W m-2 sr-1, radiant intensity W sr-1. No render
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,6 +60,10 @@ class MovingObject:
     motion: Motion
 
 
+SWITCHING_S = 0.8
+"""Time in which a lamp becomes bright; discharge lamps take longer, incandescent ones less."""
+
+
 @dataclass(frozen=True)
 class Lamp:
     """A small lamp that lights other things (a street lamp, a head light, a ceiling tube).
@@ -67,7 +72,7 @@ class Lamp:
     radius keeps it finite close by. `cutoff_cos` = -1 shines everywhere; otherwise the intensity
     falls smoothly to 0 at that cosine from `direction`. `rides` lamps move with the camera. A lamp
     with a `carrier` is fixed to that one of `World.moving`, in whose own coordinates its position
-    and direction are.
+    and direction are. It comes on at `on_s`, within `SWITCHING_S`.
     """
 
     position_m: tuple[float, float, float]
@@ -77,6 +82,11 @@ class Lamp:
     cutoff_cos: float = -1.0
     rides: bool = False
     carrier: int | None = None
+    on_s: float = -math.inf
+
+    def share_on(self, time_s: float) -> float:
+        """How much of its light a lamp gives at a time, 0 to 1."""
+        return min(1.0, max(0.0, (time_s - self.on_s) / SWITCHING_S))
 
 
 @dataclass(frozen=True)
@@ -117,6 +127,8 @@ class Light:
         Any number; at an instant `MAX_LAMPS` of them shine.
     indoor : Indoor or None
         The roofed part of the world, if any.
+    fading_per_s : float
+        Rate at which sun and sky fall from time 0 on, as at dusk: by a factor e in 1 / rate.
     """
 
     sun_irradiance: float
@@ -125,6 +137,17 @@ class Light:
     sky_horizon: float
     lamps: tuple[Lamp, ...]
     indoor: Indoor | None = None
+    fading_per_s: float = 0.0
+
+    def at(self, time_s: float) -> Light:
+        """The light of an instant: sun and sky as bright as they are then."""
+        left = math.exp(-self.fading_per_s * time_s)
+        return replace(
+            self,
+            sun_irradiance=self.sun_irradiance * left,
+            sky_zenith=self.sky_zenith * left,
+            sky_horizon=self.sky_horizon * left,
+        )
 
 
 MAX_LAMPS = 16

@@ -12,6 +12,7 @@ from shotenv.world.draw import draw_world
 from shotenv.world.ego import ACCELERATION_M_S2, LANE_MANNERS, PARKING_MANNERS, draw_ego
 from shotenv.world.families.settings import SETTINGS
 from shotenv.world.geometry import materials as m, meshes
+from shotenv.world.geometry.model import Lamp
 from shotenv.world.geometry.motion import Arc, Pose, ground_speed_m_s, yaw_rate_rad_s
 from shotenv.world.geometry.road import (
     Bent,
@@ -274,6 +275,22 @@ def test_some_drives_go_into_and_out_of_tunnels_garages_and_halls():
 def is_inside(world, time):
     place, box = np.array(world.ego.at(time).position_m), world.light.indoor
     return bool((place > box.low).all() and (place < box.high).all())
+
+
+def test_night_falls_and_lamps_come_on_in_some_clips():
+    worlds = [draw_world("night_road", seed, LONG) for seed in range(24)]
+    dusks = [world.light for world in worlds if world.light.fading_per_s]
+    assert 1 <= len(dusks) <= 9
+    for light in dusks:
+        assert light.sky_zenith > 4 * light.at(6.4).sky_zenith > 1e-5
+        street = {lamp.on_s for lamp in light.lamps if lamp.carrier is None and not lamp.rides}
+        # All of a street at once, within the clip.
+        assert len(street) <= 1
+        assert all(0.0 < on_s < 6.4 for on_s in street)
+    assert any(lamp.on_s > 0 for light in dusks for lamp in light.lamps)
+    lamp = Lamp((0.0, 0.0, 5.0), 1.0, on_s=2.0)
+    assert [lamp.share_on(t) for t in (1.9, 2.4, 3.0)] == pytest.approx([0.0, 0.5, 1.0])
+    assert Lamp((0.0, 0.0, 5.0), 1.0).share_on(-1.0) == 1.0
 
 
 @pytest.mark.parametrize("family", EVERY)

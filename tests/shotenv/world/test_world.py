@@ -145,7 +145,8 @@ def test_families_have_their_light(drawn):
         if world.family in ("sunny_road", "overcast_street", "garage", "warehouse", "night_road"):
             assert (light.sun_irradiance > 0) == (world.family == "sunny_road")
         if world.family == "night_road":
-            assert light.sky_zenith < 1e-3
+            # At dusk it is brighter at first.
+            assert light.sky_zenith < (0.1 if light.fading_per_s else 1e-3)
         if world.family in ("garage", "tunnel", "night_road", "warehouse"):
             assert light.lamps
 
