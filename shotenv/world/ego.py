@@ -81,7 +81,9 @@ def draw_ego(
     else:
         profile = draw_profile(rng, place.speed_m_s, limits, duration_s)
         road = draw_bends(rng, place.bend_m, profile, duration_s)
-    weave = WIDEST_WEAVE_M * rng.uniform(), rng.uniform(30.0, 80.0), rng.uniform(0.0, math.tau)
+    # Drivers swing about the middle of their lane once in 5 to 9 s.
+    length = 15.0 + profile.highest_m_s * rng.uniform(5.0, 9.0)
+    weave = WIDEST_WEAVE_M * rng.uniform(), length, rng.uniform(0.0, math.tau)
     return Drive(profile, Curve(), height, pitch, body, *map(float, weave)), road
 
 
@@ -191,9 +193,7 @@ def draw_bends(
     """
     if radius_m is None or rng.random() > BEND_SHARE:
         return Curve()
-    fastest = max((c.speed_m_s for c in profile.changes), default=0.0)
-    fastest = max(fastest, profile.start_m_s)
-    low = max(radius_m[0], fastest**2 / CORNERING_M_S2)
+    low = max(radius_m[0], profile.highest_m_s**2 / CORNERING_M_S2)
     bounds = low, max(radius_m[1], 1.5 * low)
     knots: list[tuple[float, float]] = []
     at, end = -80.0 + rng.uniform(0.0, 40.0), profile.distance_m(duration_s) + 150.0

@@ -69,6 +69,11 @@ class SpeedProfile:
                     "change before ends"
                 )
 
+    @property
+    def highest_m_s(self) -> float:
+        """Highest of the speeds, forwards."""
+        return max(self.start_m_s, *(change.speed_m_s for change in self.changes), 0.0)
+
     def distance_m(self, time_s: float) -> float:
         """Distance since time 0, negative before it for who goes forwards."""
         return self._since_first_m(time_s) - self._at_zero_m

@@ -180,7 +180,8 @@ def test_no_bend_throws_the_ego_out():
         bent = Bent(drive, road)
         for time in np.arange(0.0, 6.4, 0.2):
             sideways = abs(ground_speed_m_s(bent, time) * yaw_rate_rad_s(bent, time))
-            assert sideways < 4.0
+            # The swing within the lane adds a little to the bend's own 2.5 m/s2.
+            assert sideways < 3.1
 
 
 def test_bent_ground_lies_along_the_road():
