@@ -19,7 +19,6 @@ from .motion import (
 from .road import Curve as Curve
 from .site import Site as Site
 from .speed import (
-    HIGHEST_SPEED_M_S as HIGHEST_SPEED_M_S,
     SpeedChange as SpeedChange,
     SpeedProfile as SpeedProfile,
     change_s as change_s,

@@ -84,8 +84,8 @@ class Site:
     travel_m : float
         How far along the road the ego gets.
     taken : list of float64 [T, 2, 2]
-        Ground rectangles that are not free: first those of all T things that stand, then those of
-        each thing that moves at T instants, the ego before all others.
+        Ground rectangles that are not free, of one thing each, the ego first: T is 1 for what
+        stands, and the number of instants for what moves.
     """
 
     def __init__(
@@ -113,7 +113,10 @@ class Site:
         self.travel_m = max(pose.position_m[0] for pose in way)
         # The ego is the first to take ground, so that nothing can be put in its way.
         x, y = (-EGO_BEHIND_M, EGO_AHEAD_M), (-EGO_BESIDE_M, EGO_BESIDE_M)
-        self.taken = [np.empty((0, 2, 2)), rectangles(x, y, way)]
+        self.taken = [rectangles(x, y, way)]
+        # Those of `taken` that stand, in one array, which is compared at once. In a list, since
+        # the site's stretches share it.
+        self._standing = [np.empty((0, 2, 2))]
         self._triangles: Counter[int] = Counter()
         # Beside each of `static`: where along the road it stands as a rigid thing, NaN for what
         # bends with the road, infinity for what is told in the world and stays as it is.
@@ -222,18 +225,17 @@ class Site:
         affordable = self._triangles[stretch] + faces <= MAX_TRIANGLES
         if not (inside and low_enough and affordable and self._is_own_ground(taken)):
             return False
-        if any(overlap(taken, other) for other in self.taken[1:]):
+        if any(overlap(taken, other) for other in self.taken if len(other) > 1):
             return False
         # Of what stands, only what the whole way comes near has to be compared at each instant.
-        standing = self.taken[0]
+        standing = self._standing[0]
         hull = np.stack([taken[:, 0].min(axis=0), taken[:, 1].max(axis=0)])[None]
         if any(overlap(taken, standing[i : i + 1]) for i in np.flatnonzero(near(hull, standing))):
             return False
         # Whoever comes first has the ground: later things see it as taken, at each instant.
+        self.taken.append(taken)
         if len(poses) == 1:
-            self.taken[0] = np.concatenate([standing, taken])
-        else:
-            self.taken.append(taken)
+            self._standing[0] = np.concatenate([standing, taken])
         self._triangles[stretch] += faces
         return True
 
