@@ -16,7 +16,6 @@ from shotenv.world.families.traffic import (
     put_walkers,
 )
 from shotenv.world.geometry import (
-    Arc,
     Indoor,
     Lamp,
     Mesh,
@@ -56,14 +55,14 @@ def lay_out_garage(site: Site, rng: np.random.Generator) -> None:
     for side in (-1, 1):
         put_parked_cars(site, rng, end, side * (aisle / 2 + depth / 2 + 0.2), bay, side)
     if near and rng.random() < 0.5:
-        site.put(vehicles.car(rng), end - 1.2, rng.uniform(-0.5, 0.5), np.pi / 2)
+        site.put(vehicles.car(rng).at_rest, end - 1.2, rng.uniform(-0.5, 0.5), np.pi / 2)
     build_ceiling_lamps(site, rng, (-7.0, end), height, (-aisle / 4, aisle / 4))
     put_crossers(site, rng, (-aisle / 2, aisle / 2), near=0.8)
     put_walkers(site, rng, (1, 3), (-aisle / 2 + 0.3, aisle / 2 - 0.3))
     if rng.random() < 0.35:
         x = rng.uniform(8.0, 20.0) + site.travel_m
-        path = Arc(Pose((x, aisle / 4, 0.0), np.pi), rng.uniform(0.5, 3.0))
-        put_approaching(site, rng, path, vehicles.car)
+        start = Pose((x, aisle / 4, 0.0), np.pi)
+        put_approaching(site, rng, start, rng.uniform(0.5, 3.0), vehicles.car)
     put_vehicle_ahead(site, rng)
     put_row(site, rng, low_thing, rng.choice([-1, 1]) * (aisle / 2 - 0.2), 4.0, 0.0, share=0.4)
 
@@ -238,7 +237,7 @@ def lay_out_tunnel(site: Site, rng: np.random.Generator) -> None:
     put_vehicle_ahead(site, rng)
     if rng.random() < 0.6:
         x = rng.uniform(6.0, 26.0) + 0.5 * site.travel_m
-        put_approaching(site, rng, Arc(Pose((x, lane, 0.0), np.pi), rng.uniform(3.0, 14.0)))
+        put_approaching(site, rng, Pose((x, lane, 0.0), np.pi), rng.uniform(3.0, 14.0))
     put_walkers(site, rng, (0, 2), (centre - half + 0.3, centre - half + 0.5), 0.15)
 
 

@@ -74,8 +74,9 @@ def lay_out_town_street(site: Site, rng: np.random.Generator) -> None:
     put_facades(site, rng, right - pavement, np.pi / 2)
     put_facades(site, rng, left + pavement, -np.pi / 2)
     put_vehicle_ahead(site, rng)
-    put_oncoming(site, rng, lane)
+    # Who crosses comes first: drivers stop for them.
     put_crossers(site, rng, (right + 0.3, left - 0.3))
+    put_oncoming(site, rng, lane)
     put_walkers(site, rng, (1, 4), (right - pavement + 0.5, right - 0.5), KERB_M)
     put_walkers(site, rng, (0, 3), (left + 0.5, left + pavement - 0.5), KERB_M)
     put_cyclist(site, rng, -lane / 2 - 0.1)
@@ -114,7 +115,7 @@ def lay_out_car_park(site: Site, rng: np.random.Generator) -> None:
     build_puddles(site, rng, (-5.0, 5.0))
     ahead = rng.random()
     if ahead < 0.35:
-        car, facing = vehicles.car(rng), np.pi if rng.random() < 0.5 else 0.0
+        car, facing = vehicles.car(rng).at_rest, np.pi if rng.random() < 0.5 else 0.0
         half_length = float(car.corners[..., 0].max())
         site.put(car, end + half_length, rng.uniform(-0.4, 0.4), facing)
         site.put(backdrop(rng), end + rng.uniform(7, 14), rng.uniform(-3, 3), np.pi)

@@ -6,20 +6,21 @@ import numpy as np
 
 from shotenv.world.families.construction import passing_worker
 from shotenv.world.families.roads import BEHIND_M, PAINT_M, REACH_M
-from shotenv.world.families.traffic import draw_one, put_crossers, put_row, put_walkers
+from shotenv.world.families.traffic import draw_one, put_crossers, put_driver, put_row, put_walkers
 from shotenv.world.geometry import (
-    Arc,
     Indoor,
     Lamp,
     Material,
     Mesh,
+    Mover,
     Pose,
+    Rigid,
     Site,
     lights,
     materials as m,
     meshes,
 )
-from shotenv.world.things import people, wheel
+from shotenv.world.things import axle, people
 from unwrap.support import Range
 
 RACK_DEPTH_M = 1.1
@@ -132,7 +133,7 @@ def put_fork_lift(site: Site, rng: np.random.Generator, end: float, aisle: float
     x, yaw = site.travel_m + rng.uniform(4.0, 10.0), rng.integers(2) * np.pi
     # 0.9 m is half of its width and some clearance.
     offset = (aisle / 2 - 0.9) * rng.uniform(-0.6, 1.0)
-    site.put_moving(fork_lift(rng), Arc(Pose((min(x, end - 3.0), offset, 0.0), yaw), speed))
+    put_driver(site, fork_lift(rng), Pose((min(x, end - 3.0), offset, 0.0), yaw), speed)
 
 
 def build_high_bays(site: Site, rng: np.random.Generator, end: float, height: float) -> None:
@@ -235,7 +236,7 @@ def pallet_jack(rng: np.random.Generator) -> Mesh:
 
 
 @meshes.thing
-def fork_lift(rng: np.random.Generator) -> Mesh:
+def fork_lift(rng: np.random.Generator) -> Mover:
     """A counterbalanced truck with mast, forks, overhead guard and driver, perhaps a load."""
     paint, dark, tyre = m.MACHINE_PAINT.draw(rng), m.DARK_METAL.draw(rng), m.TYRE.draw(rng)
     lift = rng.uniform(0.08, 0.4)
@@ -259,8 +260,8 @@ def fork_lift(rng: np.random.Generator) -> Mesh:
         *driver,
         meshes.box((1.3, 1.0, 0.06), dark, (-0.1, 0.0, 2.1)),
         meshes.box((0.08, 0.8, 0.5), dark, (1.0, 0.0, lift)),
-        *(wheel(x, side, 0.53, 0.28, tyre, paint) for x in (0.5, -0.7) for side in (-1, 1)),
     ]
     if rng.random() < 0.5:
         parts.append(meshes.at(load(rng), 1.55, 0.0, lift + 0.06))
-    return meshes.join(parts)
+    wheels = (axle(x, 0.53, 0.28, tyre, paint) for x in (0.5, -0.7))
+    return Mover((Rigid(meshes.join(parts)), *wheels))

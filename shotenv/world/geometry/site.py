@@ -21,7 +21,8 @@ from shotenv.world.geometry.model import (
     MovingObject,
     World,
 )
-from shotenv.world.geometry.motion import Motion, Pose
+from shotenv.world.geometry.motion import Motion, Pose, Route
+from shotenv.world.geometry.mover import SWEPT_INSTANTS, Mover, swept
 from shotenv.world.geometry.weather import DRY, Weather, weathered
 from unwrap.support import Range
 
@@ -73,7 +74,7 @@ class Site:
         self.travel_m = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
         # The ego is the first to take ground, so that nothing can be put in its way.
         margin = np.array([EGO_AHEAD_M, EGO_BESIDE_M])
-        self._taken = [np.stack([way - margin, way + margin], axis=1)]
+        self.taken = [np.stack([way - margin, way + margin], axis=1)]
         self._triangles = 0
 
     def enclose(self, x: Range, y: Range, ceiling_m: float) -> None:
@@ -91,20 +92,24 @@ class Site:
     def put(self, mesh: Mesh, x: float, y: float, yaw: float = 0.0, z: float = 0.0) -> bool:
         """Stand a thing at (x, y) on a floor of height `z`; false if there is no room."""
         pose = Pose((x, y, z), yaw)
-        free = self._claim(mesh, [pose])
+        free = self._claim(mesh.corners.reshape(-1, 3), len(mesh.corners), [pose])
         if free:
             self.static.append(weathered(meshes.place(mesh, pose), self.weather))
         return free
 
-    def put_moving(self, mesh: Mesh, motion: Motion) -> bool:
-        """Add a thing that moves on its lowest point; false if its way is not free.
+    def put_moving(self, mover: Mover, route: Route) -> bool:
+        """Add a thing that moves, its origin on the ground; false if its way is not free.
 
-        What moves stays dry and bare: rain and snow lie on what stands still.
+        All that its parts sweep is one footprint that moves with its body. What moves stays dry
+        and bare: rain and snow lie on what stands still.
         """
-        mesh = meshes.grounded(mesh)
-        free = self._claim(mesh, [motion.at(time) for time in self.times])
+        pieces = mover.on(route, (0.0, self.duration_s))
+        instants = np.linspace(0.0, self.duration_s, SWEPT_INSTANTS)
+        outline = swept(pieces, route, instants, HEADROOM_M)
+        faces = sum(len(piece.mesh.corners) for piece in pieces)
+        free = self._claim(outline, faces, [route.at(time) for time in self.times])
         if free:
-            self.moving.append(MovingObject(mesh, motion))
+            self.moving += pieces
         return free
 
     def world(self, family: Family, seed: int, light: Light) -> World:
@@ -122,25 +127,28 @@ class Site:
         away = np.subtract(place, (self.travel_m / 2 + 4.0, 0.0, 0.0))
         return not lamp.rides, float(np.linalg.norm(away))
 
-    def _claim(self, mesh: Mesh, poses: list[Pose]) -> bool:
-        """Take the ground under a thing at one pose, or at one per instant; false if not free."""
-        taken = footprints(mesh, poses)
+    def _claim(self, points: np.ndarray, faces: int, poses: list[Pose]) -> bool:
+        """Take the ground under points [N, 3] of a thing of so many faces; false if not free.
+
+        The thing stands at one pose or is at one for each instant.
+        """
+        taken = footprints(points, poses)
         inside = (taken[:, 0] >= self.room[0]).all() and (taken[:, 1] <= self.room[1]).all()
-        low_enough = poses[0].position_m[2] + mesh.corners[..., 2].max() < self.ceiling_m
-        affordable = self._triangles + len(mesh.corners) <= MAX_TRIANGLES
+        low_enough = poses[0].position_m[2] + points[:, 2].max() < self.ceiling_m
+        affordable = self._triangles + faces <= MAX_TRIANGLES
         if not (inside and low_enough and affordable):
             return False
-        if any(overlap(taken, other) for other in self._taken):
+        if any(overlap(taken, other) for other in self.taken):
             return False
         # Whoever comes first has the ground: later things see it as taken, at each instant.
-        self._taken.append(taken)
-        self._triangles += len(mesh.corners)
+        self.taken.append(taken)
+        self._triangles += faces
         return True
 
 
-def footprints(mesh: Mesh, poses: list[Pose]) -> np.ndarray:
-    """Ground rectangles [T, 2, 2] ((low, high), (x, y)) of what is below the headroom."""
-    points = mesh.corners.reshape(-1, 3).astype(np.float64)
+def footprints(points: np.ndarray, poses: list[Pose]) -> np.ndarray:
+    """Ground rectangles [T, 2, 2] ((low, high), (x, y)) of points [N, 3] below the headroom."""
+    points = points.astype(np.float64)
     points = points[points[:, 2] < HEADROOM_M, :2]
     (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
     outline = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
