@@ -161,7 +161,8 @@ def put_oncoming(site: Site, rng: np.random.Generator, lane: float) -> None:
     x = rng.uniform(5.0, 28.0) + 0.5 * site.travel_m
     red = (rng.uniform(5.0, 20.0), rng.uniform(2.0, 10.0)) if rng.random() < 0.25 else None
     # More of them come in a long clip.
-    for _ in range(min(rng.integers(0, 3) + rng.poisson(0.06 * site.duration_s), 4)):
+    count = int(rng.integers(0, 3) + rng.poisson(0.06 * site.duration_s))
+    for _ in range(min(count, 4)):
         speed = rng.uniform(3.0, 14.0) if rng.random() < 0.75 else 0.0
         start = Pose((x, lane + rng.uniform(-0.2, 0.3), 0.0), np.pi)
         put_approaching(site, rng, start, speed, red=red)

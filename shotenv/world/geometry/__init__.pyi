@@ -1,6 +1,12 @@
 from . import lights as lights, materials as materials, meshes as meshes
-from .gait import Leg as Leg
-from .limbs import Limb as Limb, Pedalling as Pedalling, Walking as Walking
+from .gait import (
+    LEAN as LEAN,
+    Leg as Leg,
+    Posture as Posture,
+    Segment as Segment,
+    pedalling_posture as pedalling_posture,
+    walking_posture as walking_posture,
+)
 from .materials import Material as Material
 from .model import (
     MAX_LAMPS as MAX_LAMPS,
@@ -8,6 +14,7 @@ from .model import (
     Lamp as Lamp,
     Light as Light,
     Mesh as Mesh,
+    MovingObject as MovingObject,
     World as World,
 )
 from .motion import (

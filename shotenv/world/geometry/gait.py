@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -34,12 +35,14 @@ STANDING_M_S = 0.02
 """Slower than this is standing."""
 STANCE = 0.62
 """Time of a foot on the ground before and after it is passed, in steps: 62 % of a stride."""
-LONGEST_STANCE = 0.55
-"""Of the hip's height: farther than this a foot is left behind, so fast runners leave the ground."""
+LONGEST_STANCE = 0.42
+"""Of the hip's height: no foot stays behind farther, so that fast runners leave the ground."""
 USUAL_STEP_M = 0.7
 """Step of somebody 1.75 m tall at which foot and arms swing as far as said below."""
 STRIKE_RAD, RISE_RAD = 0.35, 0.95
 """How far toes are raised where a heel strikes, and heels where toes leave the ground."""
+STRAIGHTEST = 0.988
+"""Longest a leg gets, of thigh and shank together: a knee that locks would jerk."""
 ARM_RAD = 0.5
 """Swing of the arms to either side."""
 
@@ -75,7 +78,7 @@ class Leg:
     @property
     def hip_z_m(self) -> float:
         """Height of the hip of who stands: knees are never quite straight."""
-        return 0.995 * (self.thigh_m + self.shank_m) + self.ankle_m
+        return STRAIGHTEST * (self.thigh_m + self.shank_m) + self.ankle_m
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +138,7 @@ def table_times(span_s: Range) -> Array:
     return np.arange(span_s[0] - MARGIN_S, span_s[1] + MARGIN_S + TABLE_S, TABLE_S)
 
 
-def gait(
+def walking_posture(
     route: Route, span_s: Range, legs: Sequence[Leg], height_m: float, phase: float
 ) -> Posture:
     """Posture of a walker: hips, lean, an arm and then thigh, shank and foot for each leg.
@@ -165,15 +168,26 @@ def gait(
     stride = np.minimum(walk.steps_m / (USUAL_STEP_M * size), 1.5)
     stance = min(STANCE, LONGEST_STANCE * legs[0].hip_z_m / max(walk.steps_m.max(), 1e-6))
     feet = [foot_path(walk, leg, stance, size) for leg in legs]
+    in_air = [np.abs(_since_fall(walk, leg)) > stance for leg in legs]
     still = np.clip(1.0 - speed / 0.3, 0.0, 1.0)
     shift_x = 0.015 * size * still * np.sin(2 * np.pi * (times / 5.3 + phase))
-    shift_z = _hip_drop(walk, legs, feet, shift_x)
+    away = [x - ways - leg.hip_x_m - shift_x for leg, (x, _, _) in zip(legs, feet, strict=True)]
+    # How far a leg reaches down where its foot is so far ahead.
+    spans = [
+        np.sqrt(np.maximum((STRAIGHTEST * (leg.thigh_m + leg.shank_m)) ** 2 - dx**2, 0.0))
+        for leg, dx in zip(legs, away, strict=True)
+    ]
+    shift_z = _bob(walk, stance, legs[0].hip_z_m)
+    for leg, (_, z, _), span, lifted in zip(legs, feet, spans, in_air, strict=True):
+        # Hips sink where a foot on the ground would be out of reach.
+        shift_z = np.where(lifted, shift_z, np.minimum(shift_z, z + span - leg.hip_z_m))
     lean = 0.03 * stride + 0.015 * still * np.sin(2 * np.pi * (times / 3.7 + 2.0 * phase))
     arms = [lean - ARM_RAD * stride * np.sin(np.pi * (walk.phase - leg.turn)) for leg in legs]
     columns = [shift_x, shift_z, lean, *arms]
-    for leg, (x, z, pitch) in zip(legs, feet, strict=True):
-        from_hip = x - ways - leg.hip_x_m - shift_x
-        columns += [*two_bones(leg, from_hip, leg.hip_z_m + shift_z - z), pitch]
+    for leg, (_, z, pitch), dx, span in zip(legs, feet, away, spans, strict=True):
+        # A foot in the air comes along: who runs lifts the heel that stays behind.
+        below = np.minimum(leg.hip_z_m + shift_z - z, span)
+        columns += [*two_bones(leg, dx, below), pitch]
     return Posture(float(times[0]), tuple(tuple(column.tolist()) for column in columns))
 
 
@@ -188,7 +202,7 @@ def step_phase(speed: Array, factor: float, phase: float) -> Array:
     made[~moving] = 0.0
     bounds = [0, *(np.flatnonzero(np.diff(moving)) + 1).tolist(), len(speed)]
     start = phase if moving[0] else 0.5
-    for first, end in zip(bounds[:-1], bounds[1:], strict=True):
+    for first, end in pairwise(bounds):
         if moving[first] and end < len(speed):
             total = float(made[first:end].sum())
             if first:
@@ -220,8 +234,8 @@ def foot_path(walk: _Walk, leg: Leg, stance: float, size: float) -> tuple[Array,
     On the ground the foot turns about the rear edge of its sole, then lies flat, then turns about
     the front edge: whichever edge it is does not move. In the air it goes from one to the next.
     """
-    fall = 2.0 * np.round((walk.phase - leg.turn) / 2.0) + leg.turn
-    since = walk.phase - fall
+    since = _since_fall(walk, leg)
+    fall = walk.phase - since
 
     def planted(fall: Array, since: Array) -> tuple[Array, Array, Array]:
         """Ankle and pitch of the foot that is passed after `fall` steps, `since` steps later."""
@@ -233,7 +247,7 @@ def foot_path(walk: _Walk, leg: Leg, stance: float, size: float) -> tuple[Array,
         edge = np.where(pitch > 0.0, leg.toe_m, leg.heel_m)
         sin, cos = np.sin(pitch), np.cos(pitch)
         # Feet are on the ground longer behind the body than before it.
-        x = walk.way_after(fall) - 0.12 * step + leg.hip_x_m
+        x = walk.way_after(fall) - 0.19 * stance * step + leg.hip_x_m
         return x + edge * (1.0 - cos) + leg.ankle_m * sin, edge * sin + leg.ankle_m * cos, pitch
 
     on_ground = planted(fall, np.clip(since, -stance, stance))
@@ -244,29 +258,27 @@ def foot_path(walk: _Walk, leg: Leg, stance: float, size: float) -> tuple[Array,
     eased = _ease(share)
     # Toes must clear the ground while the foot turns level again.
     step = np.minimum(lands[0] - leaves[0], 2.0 * size)
-    lift = 0.05 * step * np.sin(np.pi * share) ** 2
+    lift = 0.018 * step**2 * np.sin(np.pi * share)
     in_air = [a + eased * (b - a) for a, b in zip(leaves, lands, strict=True)]
     swings = np.abs(since) > stance
     x, z, pitch = (np.where(swings, a, g) for a, g in zip(in_air, on_ground, strict=True))
     return x, np.where(swings, z + lift, z), pitch
 
 
-def _hip_drop(
-    walk: _Walk,
-    legs: Sequence[Leg],
-    feet: Sequence[tuple[Array, Array, Array]],
-    shift_x: Array,
-) -> Array:
-    """How far hips are below where they are of who stands [T]: lowest between two steps."""
-    # Legs as stiff as compasses would drop by step^2 / (8 leg); feet that roll off save a third.
-    sway = 0.62 * walk.steps_m**2 / (8.0 * legs[0].hip_z_m)
-    drop = -sway * (1.0 - np.cos(2 * np.pi * walk.phase)) / 2.0
-    for leg, (x, z, _) in zip(legs, feet, strict=True):
-        reach = 0.999 * (leg.thigh_m + leg.shank_m)
-        away = x - walk.ways_m - leg.hip_x_m - shift_x
-        most = z + np.sqrt(np.maximum(reach**2 - away**2, 0.0)) - leg.hip_z_m
-        drop = np.minimum(drop, most)
-    return drop
+def _since_fall(walk: _Walk, leg: Leg) -> Array:
+    """Steps [T] made since the body passed, or until it will pass, the foot that is nearest."""
+    since = walk.phase - leg.turn
+    return since - 2.0 * np.round(since / 2.0)
+
+
+def _bob(walk: _Walk, stance: float, hip_z_m: float) -> Array:
+    """How far hips are below where they are of who stands [T], at most."""
+    # Legs as stiff as compasses would drop by step^2 / (8 leg) between two steps; feet that roll
+    # off save a third.
+    sway = np.minimum(0.62 * walk.steps_m**2 / (8.0 * hip_z_m), 0.06 * hip_z_m)
+    # Who runs is lowest in the middle of a step and not between two.
+    walks = np.clip((stance - 0.5) / (STANCE - 0.5), -1.0, 1.0)
+    return -sway * (1.0 - walks * np.cos(2 * np.pi * walk.phase)) / 2.0
 
 
 def two_bones(leg: Leg, ahead: Array, below: Array) -> tuple[Array, Array]:
@@ -291,7 +303,7 @@ def _ease(share: Array) -> Array:
     return u * u * (3.0 - 2.0 * u)
 
 
-def pedalling(
+def pedalling_posture(
     route: Route,
     span_s: Range,
     legs: Sequence[Leg],
@@ -300,10 +312,10 @@ def pedalling(
     crank_m: float,
     turn_m: float,
 ) -> Posture:
-    """Posture of a cyclist: the columns of `gait`, the cranks turning once in `turn_m` of way.
+    """Posture of a cyclist, whose cranks turn once in `turn_m` of way.
 
-    Hips keep still at `hip_z_m`; feet are on pedals at `crank_m` from the cranks' axle
-    `bottom_m`, half a turn apart.
+    Columns are those of `walking_posture`. Hips keep still at `hip_z_m`; feet are on pedals at
+    `crank_m` from the cranks' axle `bottom_m`, half a turn apart.
     """
     times = table_times(span_s)
     ways = np.array([route.way_m(time) for time in times])

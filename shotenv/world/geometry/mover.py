@@ -17,7 +17,7 @@ from unwrap.support import Range
 
 HERE = Arc(Pose((0.0, 0.0, 0.0)))
 """The route of what stands at the origin."""
-SWEPT_INSTANTS = 24
+SWEPT_INSTANTS = 12
 """Instants of a clip at which the ground under moving limbs is looked at: a few in each step."""
 
 
@@ -91,24 +91,23 @@ def posed(mesh: Mesh, pose: Pose) -> Mesh:
 
 
 def swept(
-    pieces: Sequence[MovingObject], route: Route, times_s: np.ndarray, below_m: float
+    pieces: Sequence[MovingObject], route: Route, span_s: Range, below_m: float
 ) -> np.ndarray:
     """Corners [5, 3] around what pieces sweep in the axes of their route, above its ground.
 
     Four are the rectangle on the ground around all that is lower than `below_m`; one is as high
     as the highest corner.
     """
-    bodies = [route.at(time) for time in times_s]
+    times = np.linspace(*span_s, SWEPT_INSTANTS)
+    bodies = [route.at(time) for time in times]
     lows, highs, top = [], [], 0.0
     for piece in pieces:
         points = piece.mesh.corners.reshape(-1, 3).astype(np.float64)
         if piece.motion is not route:
-            points = np.concatenate(
-                [
-                    _in_axes(points, piece.motion.at(time), body)
-                    for time, body in zip(times_s, bodies, strict=True)
-                ]
-            )
+            # Eight corners stand for all of a limb or a wheel, which makes it a little larger.
+            corners = np.array([points.min(axis=0), points.max(axis=0)])
+            box = np.stack([corners[i, range(3)] for i in np.ndindex(2, 2, 2)])
+            points = _seen_from(bodies, [piece.motion.at(time) for time in times], box)
         top = max(top, float(points[:, 2].max()))
         low = points[points[:, 2] < below_m, :2]
         if len(low):
@@ -119,13 +118,20 @@ def swept(
     return np.array(ring)
 
 
-def _in_axes(points: np.ndarray, pose: Pose, body: Pose) -> np.ndarray:
-    """Points [N, 3] of a part as its body, which stands upright, sees them."""
-    pitch, yaw = pose.pitch_rad - body.pitch_rad, pose.yaw_rad - body.yaw_rad
-    away = np.subtract(pose.position_m, body.position_m)
-    cos, sin = math.cos(body.yaw_rad), math.sin(body.yaw_rad)
-    place = (away[0] * cos + away[1] * sin, away[1] * cos - away[0] * sin, away[2])
-    return points @ rotation(Pose(meshes.ORIGIN, yaw, pitch)).T + place
+def _seen_from(bodies: list[Pose], poses: list[Pose], points: np.ndarray) -> np.ndarray:
+    """Points [N, 3] of a part at T poses [T N, 3], in the axes of bodies that stand upright."""
+    turns = np.array([rotation(pose) for pose in poses])
+    away = (
+        points @ turns.swapaxes(1, 2)
+        + np.array(
+            [
+                np.subtract(pose.position_m, body.position_m)
+                for pose, body in zip(poses, bodies, strict=True)
+            ]
+        )[:, None]
+    )
+    back = np.array([rotation(Pose(body.position_m, body.yaw_rad)) for body in bodies])
+    return (away @ back).reshape(-1, 3)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from shotenv.world.geometry.model import (
     World,
 )
 from shotenv.world.geometry.motion import Motion, Pose, Route
-from shotenv.world.geometry.mover import SWEPT_INSTANTS, Mover, swept
+from shotenv.world.geometry.mover import Mover, swept
 from shotenv.world.geometry.weather import DRY, Weather, weathered
 from unwrap.support import Range
 
@@ -103,10 +103,10 @@ class Site:
         All that its parts sweep is one footprint that moves with its body. What moves stays dry
         and bare: rain and snow lie on what stands still.
         """
-        pieces = mover.on(route, (0.0, self.duration_s))
-        instants = np.linspace(0.0, self.duration_s, SWEPT_INSTANTS)
-        outline = swept(pieces, route, instants, HEADROOM_M)
+        span_s = (0.0, self.duration_s)
+        pieces = mover.on(route, span_s)
         faces = sum(len(piece.mesh.corners) for piece in pieces)
+        outline = swept(pieces, route, span_s, HEADROOM_M)
         free = self._claim(outline, faces, [route.at(time) for time in self.times])
         if free:
             self.moving += pieces

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shotenv.world.geometry import Leg, Limb, Material, Mesh, Walking, materials as m, meshes
+from shotenv.world.geometry import Leg, Material, Mesh, materials as m, meshes
+from shotenv.world.things.limbs import Limb, Walking
 
 HIP_SHARE = 0.53
 """Hip over height of a person (Winter, 2009): animals step like a person with as high hips."""
@@ -39,11 +40,14 @@ def four_legged(
     """
     thigh, shank, paw = lengths
     upper = meshes.rod((0.0, 0.0, -thigh), (0.0, 0.0, 0.02), radius, coat, sections=4)
-    lower = meshes.rod((0.0, 0.0, -shank - paw), (0.0, 0.0, 0.0), 0.7 * radius, coat, sections=4)
+    foot = (0.0, 0.0, -shank - 0.98 * paw)
+    lower = meshes.rod(foot, (0.0, 0.0, 0.0), 0.55 * radius, coat, sections=4)
     limb = Limb(*(meshes.scaled(mesh, (scale,) * 3) for mesh in (upper, lower)))
     legs = tuple(
         Leg(
-            *(scale * length for length in lengths),
+            thigh_m=scale * thigh,
+            shank_m=scale * shank,
+            ankle_m=scale * paw,
             heel_m=0.0,
             toe_m=0.0,
             hip_x_m=scale * x + place_m[0],

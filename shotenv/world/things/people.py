@@ -6,18 +6,16 @@ import numpy as np
 
 from shotenv.world.geometry import (
     Leg,
-    Limb,
     Material,
     Mesh,
     Mover,
     Part,
-    Pedalling,
     Rigid,
-    Walking,
     materials as m,
     meshes,
 )
 from shotenv.world.things.animals import dog
+from shotenv.world.things.limbs import Limb, Pedalling, Walking
 from shotenv.world.things.wheels import ring
 
 HAIR_PROFILE = [(0.1, 0.0), (0.11, 0.04), (0.085, 0.11), (0.0, 0.135)]
@@ -122,9 +120,20 @@ def two_legs(
     shank = meshes.rod((0.0, 0.0, -SHANK_M), (0.0, 0.0, 0.03), 0.062, trousers, sections=6)
     sole = meshes.box((0.26, 0.10, 0.09), shoe, (0.05, 0.0, -ANKLE_M))
     limb = Limb(*(meshes.scaled(mesh, size) for mesh in (thigh, shank, sole)))
-    lengths = [size[0] * length for length in (THIGH_M, SHANK_M, ANKLE_M, -0.08, 0.18)]
-    legs = (Leg(*lengths, hip_x_m, side * 0.10 * size[1], turn) for side, turn in ((1, 0), (-1, 1)))
-    return tuple(legs), (limb, limb)
+    legs = tuple(
+        Leg(
+            thigh_m=size[0] * THIGH_M,
+            shank_m=size[0] * SHANK_M,
+            ankle_m=size[0] * ANKLE_M,
+            heel_m=-0.08 * size[0],
+            toe_m=0.18 * size[0],
+            hip_x_m=hip_x_m,
+            hip_y_m=side * 0.10 * size[1],
+            turn=turn,
+        )
+        for side, turn in ((1, 0.0), (-1, 1.0))
+    )
+    return legs, (limb, limb)
 
 
 def torso(rng: np.random.Generator, base: meshes.Point) -> Mesh:

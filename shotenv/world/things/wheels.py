@@ -46,8 +46,9 @@ def ring(
     """Thin wheels beside each other on one axle, each with what turns inside its tyre."""
     wheel = meshes.join([hoop(radius, tyre, thickness), *inside])
     mesh = meshes.join(meshes.at(wheel, 0.0, beside) for beside in y)
-    outer = float(np.hypot(mesh.corners[..., 0], mesh.corners[..., 2]).max())
-    return Wheels(mesh, (x, 0.0, outer), outer)
+    # Of rods, tyres have corners that are farther from the axle than its height over the ground.
+    height = -float(mesh.corners[..., 2].min())
+    return Wheels(mesh, (x, 0.0, height), height)
 
 
 def spokes(radius: float, metal: Material) -> Mesh:

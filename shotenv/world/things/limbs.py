@@ -5,10 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from shotenv.world.geometry.gait import LEAN, Leg, Posture, Segment, gait, pedalling
-from shotenv.world.geometry.meshes import Point
-from shotenv.world.geometry.model import Mesh, MovingObject
-from shotenv.world.geometry.motion import Route
+from shotenv.world.geometry import (
+    LEAN,
+    Leg,
+    Mesh,
+    MovingObject,
+    Posture,
+    Route,
+    Segment,
+    meshes,
+    pedalling_posture,
+    walking_posture,
+)
 from unwrap.support import Range
 
 
@@ -55,7 +63,7 @@ class Walking:
 
     def on(self, route: Route, span_s: Range) -> Iterable[MovingObject]:
         """Trunk, arms and legs on a route."""
-        posture = gait(route, span_s, self.legs, self.height_m, self.phase)
+        posture = walking_posture(route, span_s, self.legs, self.height_m, self.phase)
         (x, y), hip_z = self.place_m, self.legs[0].hip_z_m
         beside, up = self.shoulder_m
         yield MovingObject(self.trunk, Segment(route, posture, (x, y, hip_z), (), LEAN))
@@ -69,18 +77,18 @@ class Walking:
 
 @dataclass(frozen=True)
 class Pedalling:
-    """Legs of somebody on a bicycle; the attributes are those of `gait.pedalling`."""
+    """Legs of somebody on a bicycle; the attributes are those of `pedalling_posture`."""
 
     legs: tuple[Leg, ...]
     limbs: tuple[Limb, ...]
     hip_z_m: float
-    bottom_m: Point
+    bottom_m: meshes.Point
     crank_m: float
     turn_m: float
 
     def on(self, route: Route, span_s: Range) -> Iterable[MovingObject]:
         """The legs on a route."""
-        posture = pedalling(
+        posture = pedalling_posture(
             route, span_s, self.legs, self.hip_z_m, self.bottom_m, self.crank_m, self.turn_m
         )
         return leg_pieces(route, posture, self.legs, self.limbs, self.hip_z_m)

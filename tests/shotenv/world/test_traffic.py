@@ -1,0 +1,155 @@
+"""Traffic that reacts: nothing runs through anything, drivers brake in time, walkers wait."""
+
+import numpy as np
+import pytest
+from drawn_worlds import EVERY, movers_of
+
+from shotenv.config.bank import WorldConfig
+from shotenv.world.draw import draw_world
+from shotenv.world.families.following import (
+    HARDEST_BRAKING_M_S2,
+    acceleration,
+    ahead_of_ego,
+    behind_others,
+    walk_across,
+)
+from shotenv.world.geometry.motion import Arc, Pose, rotation
+from shotenv.world.geometry.mover import Along
+from shotenv.world.geometry.site import Site
+from shotenv.world.things import people, vehicles
+
+LONG = WorldConfig(frames_per_clip=64)
+LONG_S = LONG.frames_per_clip / LONG.frame_rate_hz
+KERB_M, HEAD_M = 0.2, 1.9
+"""Heights between which things can be run into."""
+
+
+def boxes(pieces, times):
+    """Ground rectangles [T, 2, 2] of what pieces reach between `KERB_M` and `HEAD_M`."""
+    result = np.empty((len(times), 2, 2))
+    for i, time in enumerate(times):
+        found = []
+        for piece in pieces:
+            pose = piece.motion.at(time)
+            points = piece.mesh.corners.reshape(-1, 3) @ rotation(pose).T + pose.position_m
+            points = points[(points[:, 2] > KERB_M) & (points[:, 2] < HEAD_M), :2]
+            if len(points):
+                found += [points.min(axis=0), points.max(axis=0)]
+        result[i] = np.min(found, axis=0), np.max(found, axis=0)
+    return result
+
+
+def meet(a, b):
+    return ((a[:, 0] < b[:, 1]) & (b[:, 0] < a[:, 1])).all(axis=1).any()
+
+
+@pytest.mark.parametrize("family", EVERY)
+def test_nothing_runs_through_anything(family):
+    times = np.linspace(0.0, LONG_S, 45)
+    for seed in range(200, 206):
+        world = draw_world(family, seed, LONG)
+        moving = [boxes(pieces, times) for pieces in movers_of(world)]
+        way = np.array([world.ego.at(time).position_m[:2] for time in times])
+        ego = np.stack([way - (0.4, 1.0), way + (0.4, 1.0)], axis=1)
+        corners = world.static.corners
+        z = corners[..., 2]
+        stands = corners[(z.max(axis=1) > KERB_M) & (z.min(axis=1) < HEAD_M)][..., :2]
+        low, high = stands.min(axis=1), stands.max(axis=1)
+        for i, box in enumerate(moving):
+            assert not meet(box, ego), (seed, i)
+            for j in range(i):
+                assert not meet(box, moving[j]), (seed, i, j)
+            for rectangle in box:
+                # Half a decimetre less on each side: rectangles of turned things are too large.
+                inside = (low < rectangle[1] - 0.05) & (high > rectangle[0] + 0.05)
+                assert not inside.all(axis=1).any(), (seed, i)
+
+
+def site(ego=None, duration_s=12.0):
+    return Site(ego or Arc(Pose((0.0, -50.0, 1.0)), 0.0), duration_s)
+
+
+def profile(path, ways_speeds, step_s=1.0):
+    ways, speeds = zip(*ways_speeds, strict=True)
+    return Along(path, 0.0, step_s, ways, speeds)
+
+
+CAR = (-2.2, 2.2)
+
+
+def test_a_driver_keeps_a_gap_to_one_who_brakes_hard_and_stops_behind():
+    place = site()
+    # From 12 m/s to a stop within 3 s.
+    leader = profile(
+        Arc(Pose((30.0, 0.0, 0.0)), 1.0),
+        [(0, 12), (12, 12), (24, 12), (34, 8), (40, 4), (42, 0), (42, 0)],
+    )
+    assert place.put_moving(vehicles.car(np.random.default_rng(0)), leader)
+    follower = behind_others(place, Pose((0.0, 0.0, 0.0)), CAR, 0.9, 13.0)
+    times = place.times
+    rear = place.taken[1][:, 0, 0]
+    nose = np.array([follower.at(time).position_m[0] for time in times]) + CAR[1]
+    assert (rear - nose).min() > 0.5
+    assert (rear - nose)[-1] < 6.0
+    speeds = np.array(follower.speeds_m_s)
+    slowing = -np.diff(speeds) / np.diff(times)
+    assert slowing.max() < 5.0
+    assert speeds[-1] < 0.2
+
+
+def test_a_free_driver_keeps_the_speed_that_is_wished():
+    route = behind_others(site(), Pose((0.0, 0.0, 0.0), np.pi), CAR, 0.9, 9.0)
+    assert route.speeds_m_s == pytest.approx([9.0] * len(route.speeds_m_s))
+    assert route.at(2.0).position_m[0] == pytest.approx(-18.0)
+
+
+def test_a_driver_stops_for_somebody_who_crosses_and_then_goes_on():
+    place = site(duration_s=20.0)
+    path = Arc(Pose((40.0, -4.0, 0.0), np.pi / 2), 1.0)
+    walk = walk_across(place, path, 1.0, 8.0, 1.2)
+    assert place.put_moving(people.adult(np.random.default_rng(0)), walk)
+    route = behind_others(place, Pose((0.0, 0.0, 0.0)), CAR, 0.9, 9.0)
+    assert place.put_moving(vehicles.car(np.random.default_rng(1)), route)
+    speeds = np.array(route.speeds_m_s)
+    assert speeds.min() < 4.0
+    assert speeds[-1] > 7.0
+    assert np.diff(speeds).min() / (place.times[1]) > -HARDEST_BRAKING_M_S2
+
+
+def test_a_driver_waits_at_a_line_until_it_may_go():
+    place = site(duration_s=15.0)
+    route = behind_others(place, Pose((0.0, 0.0, 0.0)), CAR, 0.9, 8.0, red=(30.0, 10.0))
+    ways = np.array([route.way_m(time) for time in place.times])
+    assert ways[place.times < 10.0].max() + CAR[1] < 30.0
+    assert ways[-1] > ways[place.times < 10.0].max() + 2.0
+
+
+def test_a_leader_does_before_what_the_ego_does():
+    ego = profile(Arc(Pose((0.0, 0.0, 1.0)), 1.0), [(0, 8), (8, 8), (14, 4), (16, 0), (16, 0)])
+    place = site(ego, 4.0)
+    path = Arc(Pose((8.0, 0.0, 0.0)), 1.0)
+    leader = ahead_of_ego(place, path, 1.0, 0.0, 10.0, 0.0)
+    for time in (0.0, 1.0, 2.0, 2.9):
+        # Later by the reaction time, the ego is where the leader was, less the first gap.
+        gone = ego.way_m(time + 1.0) - ego.way_m(1.0)
+        assert leader.way_m(time) == pytest.approx(gone, abs=0.1)
+    gaps = [leader.at(t).position_m[0] - ego.at(t).position_m[0] for t in place.times]
+    assert min(gaps) > 0.0
+
+
+def test_acceleration_is_the_intelligent_driver_models():
+    assert acceleration(0.0, 10.0, np.inf, 0.0) == pytest.approx(0.73)
+    assert acceleration(10.0, 10.0, np.inf, 0.0) == pytest.approx(0.0)
+    # At the gap wanted, at no speed, neither pulls.
+    assert acceleration(0.0, 10.0, 2.0, 0.0) == pytest.approx(0.0)
+    assert acceleration(10.0, 10.0, 1.0, 10.0) == -HARDEST_BRAKING_M_S2
+
+
+def test_the_same_seed_gives_the_same_ways_bit_for_bit():
+    for family in ("overcast_street", "forest_path"):
+        poses = [
+            [piece.motion.at(time) for piece in draw_world(family, 4, LONG).moving]
+            for _ in range(2)
+            for time in (-0.3, 0.0, 2.71, 6.4)
+        ]
+        assert poses[:4] == poses[4:]
