@@ -131,9 +131,9 @@ def ahead_of_ego(
     reaction time. `unrest` is the share by which the leader's speed wavers about the ego's.
     """
     step_s = float(site.times[1] - site.times[0])
-    later = np.append(site.times, site.times[-1] + step_s) + reaction_s
-    x, y = np.array([site.ego.at(time).position_m[:2] for time in later]).T
-    pace = np.hypot(np.diff(x), np.diff(y)) / step_s
+    later = [site.ego.at(time + reaction_s).position_m for time in site.times]
+    x, y, _ = np.gradient(np.array(later), step_s, axis=0).T
+    pace = np.hypot(x, y)
     waver = 1.0 + unrest * np.sin(2 * np.pi * (site.times / period_s + phase))
     return with_speeds(path, float(site.times[0]), step_s, pace * waver)
 

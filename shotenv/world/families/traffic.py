@@ -126,10 +126,10 @@ def put_vehicle_ahead(site: Site, rng: np.random.Generator) -> None:
     """Perhaps vehicles ahead in the ego's lane: close in a queue, further off when fast."""
     if rng.random() < 0.4:
         return
-    ego_speed = ground_speed_m_s(site.ego, 0.0)
-    # The rear of the vehicle that comes next.
-    rear = 1.2 + rng.uniform(0.0, 4.0) + ego_speed * rng.uniform(0.3, 1.5)
+    ego_speed = abs(ground_speed_m_s(site.ego, 0.0))
     y, reaction_s = rng.uniform(-0.3, 0.3), rng.uniform(0.3, 1.2)
+    # The rear of the vehicle that comes next: what the ego goes before it reacts stays free.
+    rear = 1.2 + rng.uniform(0.0, 4.0) + ego_speed * (reaction_s + rng.uniform(0.0, 0.8))
     unrest, period_s, phase = rng.uniform(0.0, 0.25), rng.uniform(5.0, 15.0), rng.uniform()
     # Where the ego stands all the time, the queue before it may set off.
     leaves_s = rng.uniform(-2.0, 1.2 * site.duration_s)
@@ -147,7 +147,7 @@ def put_vehicle_ahead(site: Site, rng: np.random.Generator) -> None:
             route = walk_across(site, path, leaves_s + delay_s, 200.0, rng.uniform(4.0, 10.0))
         if not site.put_moving(vehicle, route):
             return
-        rear += nose - back + rng.uniform(1.5, 4.0) + 0.8 * ego_speed
+        rear += nose - back + rng.uniform(1.5, 4.0) + ego_speed * (reaction_s + 0.3)
 
 
 def extent(mover: Mover) -> tuple[float, float, float]:

@@ -41,7 +41,7 @@ def four_legged(
     thigh, shank, paw = lengths
     upper = meshes.rod((0.0, 0.0, -thigh), (0.0, 0.0, 0.02), radius, coat, sections=4)
     foot = (0.0, 0.0, -shank - 0.98 * paw)
-    lower = meshes.rod(foot, (0.0, 0.0, 0.0), 0.55 * radius, coat, sections=4)
+    lower = meshes.rod(foot, (0.0, 0.0, 0.0), 0.4 * radius, coat, sections=4)
     limb = Limb(*(meshes.scaled(mesh, (scale,) * 3) for mesh in (upper, lower)))
     legs = tuple(
         Leg(

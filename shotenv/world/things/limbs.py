@@ -17,7 +17,6 @@ from shotenv.world.geometry import (
     pedalling_posture,
     walking_posture,
 )
-from unwrap.support import Range
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ class Walking:
     shoulder_m: tuple[float, float] = (0.0, 0.0)
     place_m: tuple[float, float] = (0.0, 0.0)
 
-    def on(self, route: Route, span_s: Range) -> Iterable[MovingObject]:
+    def on(self, route: Route, span_s: tuple[float, float]) -> Iterable[MovingObject]:
         """Trunk, arms and legs on a route."""
         posture = walking_posture(route, span_s, self.legs, self.height_m, self.phase)
         (x, y), hip_z = self.place_m, self.legs[0].hip_z_m
@@ -86,7 +85,7 @@ class Pedalling:
     crank_m: float
     turn_m: float
 
-    def on(self, route: Route, span_s: Range) -> Iterable[MovingObject]:
+    def on(self, route: Route, span_s: tuple[float, float]) -> Iterable[MovingObject]:
         """The legs on a route."""
         posture = pedalling_posture(
             route, span_s, self.legs, self.hip_z_m, self.bottom_m, self.crank_m, self.turn_m
