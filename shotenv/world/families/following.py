@@ -114,12 +114,27 @@ def _in_the_way(site: Site, start: Pose, half_m: float) -> tuple[np.ndarray, np.
             until = np.minimum(np.arange(len(inside)) + notice + 1, len(inside))
             entered = np.concatenate([[0], np.cumsum(inside)])
             inside = entered[until] > entered[:-1]
-        rears.append(np.broadcast_to(np.where(inside, rear, np.inf), site.times.shape))
+        rear = np.where(inside, rear, np.inf)
+        # Who comes closer is awaited where it will be closest: two that stop nose to nose never
+        # touch, one that drives up to where the other is now is run into.
+        rear = np.where(inside, np.minimum.accumulate(rear[::-1])[::-1], np.inf)
+        rears.append(np.broadcast_to(rear, site.times.shape))
         fronts.append(np.broadcast_to(np.where(inside, front, -np.inf), site.times.shape))
+    ends_m = to_the_wall(site, start)
+    if np.isfinite(ends_m):
+        rears.append(np.full(site.times.shape, ends_m))
+        fronts.append(np.full(site.times.shape, np.inf))
     if not rears:
         nothing = np.empty((0, len(site.times)))
         return nothing, nothing
     return np.array(rears), np.array(fronts)
+
+
+def to_the_wall(site: Site, start: Pose) -> float:
+    """Way along the road, either way, until the room ends, metres; infinite under the sky."""
+    towards = np.cos(start.yaw_rad)
+    wall = site.room[1 if towards > 0 else 0, 0]
+    return float(abs(wall - start.position_m[0])) if abs(towards) > 0.7 else np.inf
 
 
 def ahead_of_ego(

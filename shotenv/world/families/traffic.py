@@ -9,6 +9,7 @@ import numpy as np
 from shotenv.world.families.following import (
     ahead_of_ego,
     behind_others,
+    to_the_wall,
     walk_across,
     with_pause,
 )
@@ -85,7 +86,11 @@ def put_walkers(
 
 
 def strolling(site: Site, rng: np.random.Generator, start: Pose, speed_m_s: float) -> Route:
-    """Straight on, mostly without a stop."""
+    """Straight on, mostly without a stop, or up to a wall."""
+    left_m = to_the_wall(site, start) - 0.8
+    if 1.0 < left_m < speed_m_s * site.duration_s:
+        begin_s = rng.uniform(-1.0, 0.3 * site.duration_s)
+        return walk_across(site, Arc(start, 1.0), begin_s, left_m, speed_m_s)
     stop_s, pause_s = rng.uniform(0.0, 1.5 * site.duration_s), rng.uniform(2.0, 8.0)
     if speed_m_s == 0.0 or rng.random() > 0.2:
         return Arc(start, speed_m_s)

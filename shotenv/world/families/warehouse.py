@@ -6,7 +6,14 @@ import numpy as np
 
 from shotenv.world.families.construction import passing_worker
 from shotenv.world.families.roads import BEHIND_M, PAINT_M, REACH_M
-from shotenv.world.families.traffic import draw_one, put_crossers, put_driver, put_row, put_walkers
+from shotenv.world.families.traffic import (
+    TRIES,
+    draw_one,
+    put_crossers,
+    put_driver,
+    put_row,
+    put_walkers,
+)
 from shotenv.world.geometry import (
     Indoor,
     Lamp,
@@ -44,7 +51,7 @@ def lay_out_warehouse(site: Site, rng: np.random.Generator) -> None:
     site.enclose((-10.0, end - 0.05), (-half + 0.05, half - 0.05), height - 0.5)
     put_crossers(site, rng, (-aisle / 2, aisle / 2), near=0.8, draw=passing_worker)
     put_fork_lift(site, rng, end, aisle)
-    put_walkers(site, rng, (0, 2), (-aisle / 2 + 0.3, aisle / 2 - 0.3), draw=passing_worker)
+    put_walkers(site, rng, (0, 3), (-aisle / 2 + 0.3, aisle / 2 - 0.3), draw=passing_worker)
     for side in (-1, 1):
         y = side * (aisle / 2 + RACK_DEPTH_M / 2 + 0.1)
         put_row(site, rng, floor_thing, side * (aisle / 2 - 0.35), 3.0, 0.0, share=0.35)
@@ -127,13 +134,16 @@ def floor_thing(rng: np.random.Generator) -> Mesh:
 
 def put_fork_lift(site: Site, rng: np.random.Generator, end: float, aisle: float) -> None:
     """Perhaps a fork lift in the aisle, coming, going or standing."""
-    if rng.random() < 0.35:
+    if rng.random() < 0.2:
         return
-    speed = rng.uniform(0.8, 3.0) if rng.random() < 0.7 else 0.0
-    x, yaw = site.travel_m + rng.uniform(4.0, 10.0), rng.integers(2) * np.pi
-    # 0.9 m is half of its width and some clearance.
-    offset = (aisle / 2 - 0.9) * rng.uniform(-0.6, 1.0)
-    put_driver(site, fork_lift(rng), Pose((min(x, end - 3.0), offset, 0.0), yaw), speed)
+    truck = fork_lift(rng)
+    for _ in range(TRIES):
+        speed = rng.uniform(0.8, 3.0) if rng.random() < 0.8 else 0.0
+        x, yaw = site.travel_m + rng.uniform(4.0, 14.0), rng.integers(2) * np.pi
+        # 0.9 m is half of its width and some clearance.
+        offset = (aisle / 2 - 0.9) * rng.uniform(-0.6, 1.0)
+        if put_driver(site, truck, Pose((min(x, end - 3.0), offset, 0.0), yaw), speed):
+            return
 
 
 def build_high_bays(site: Site, rng: np.random.Generator, end: float, height: float) -> None:
