@@ -7,6 +7,7 @@ import numpy as np
 from figures.stage import BLUE, GRAY, GREEN, RED, Made, Row, axes, label
 from shotenv.world.families.following import behind_others, walk_across
 from shotenv.world.geometry import Arc, Pose, Site, rotation
+from shotenv.world.geometry.gait import WALK_RATIO_M_S
 from shotenv.world.geometry.mover import Rolling
 from shotenv.world.things import people, vehicles
 
@@ -17,7 +18,8 @@ def movers() -> Made:
     """Ankles of a walker along the way, and a driver who stops for somebody who crosses."""
     figure, panels = axes("Ankles of somebody at 1.3 m/s", "A driver and somebody who crosses")
     route = Arc(Pose((0.0, 0.0, 0.0)), WALK_M_S)
-    pieces = people.adult(np.random.default_rng(0)).on(route, (0.0, 4.0))
+    walker = people.figure(np.random.default_rng(0), 1.77)
+    pieces = walker.on(route, (0.0, 4.0))
     feet = [piece for piece in pieces if len(getattr(piece.motion, "above", ())) == 2]
     times = np.linspace(0.0, 3.0, 601)
     step_s = []
@@ -44,8 +46,13 @@ def movers() -> Made:
     wheel = next(piece.motion for piece in car.on(drive, (0.0, 16.0)) if rolls(piece.motion))
     slip_m = contact_slip_m(wheel, 3.0)
     cadence = 1 / float(np.mean(step_s))
+    ratio = np.sqrt(WALK_M_S / WALK_RATIO_M_S) / (walker.height_m / 1.75) ** 0.75
     return figure, [
-        Row("steps per second at 1.3 m/s, 1.75 m tall on average", "1.84", f"{cadence:.2f}"),
+        Row(
+            f"steps per second at 1.3 m/s, {walker.height_m:.2f} m tall",
+            f"{ratio:.2f}",
+            f"{cadence:.2f}",
+        ),
         Row("speed of the lowest point of a rolling wheel", "0 m/s", f"{slip_m:.4f} m/s"),
     ]
 
