@@ -49,7 +49,7 @@ def movers() -> Made:
     ratio = np.sqrt(WALK_M_S / WALK_RATIO_M_S) / (walker.height_m / 1.75) ** 0.75
     return figure, [
         Row(
-            f"steps per second at 1.3 m/s, {walker.height_m:.2f} m tall",
+            "steps per second at 1.3 m/s, 1.77 m tall",
             f"{ratio:.2f}",
             f"{cadence:.2f}",
         ),
