@@ -15,7 +15,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import torch
-from figures import decoding, laser, light, sensor
+from figures import decoding, laser, light, movers, sensor
 from figures.stage import Made, Row
 
 DOCS = Path(__file__).parent
@@ -27,6 +27,7 @@ FIGURES: tuple[Callable[[], Made], ...] = (
     light.multipath,
     light.panes,
     light.motion,
+    movers.movers,
     sensor.photon_transfer,
     sensor.depth_noise,
     sensor.full_well,

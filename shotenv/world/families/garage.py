@@ -16,7 +16,6 @@ from shotenv.world.families.traffic import (
     put_walkers,
 )
 from shotenv.world.geometry import (
-    Arc,
     Indoor,
     Lamp,
     Mesh,
@@ -96,15 +95,15 @@ def lay_out_garage(site: Site, rng: np.random.Generator) -> None:
     for side in (-1, 1):
         put_parked_cars(site, rng, last, side * (aisle / 2 + depth / 2 + 0.2), bay, side)
     if near and rng.random() < 0.5:
-        site.put(vehicles.car(rng), end - 1.2, rng.uniform(-0.5, 0.5), np.pi / 2)
+        site.put(vehicles.car(rng).at_rest, end - 1.2, rng.uniform(-0.5, 0.5), np.pi / 2)
     build_ceiling_lamps(site, rng, (max(first, -7.0), end), height, (-aisle / 4, aisle / 4))
     for part in site.stretches():
         put_crossers(part, rng, (-aisle / 2, aisle / 2), near=0.8)
         put_walkers(part, rng, (1, 3), (-aisle / 2 + 0.3, aisle / 2 - 0.3))
     if rng.random() < 0.35:
         x = rng.uniform(8.0, 20.0) + site.travel_m
-        path = Arc(Pose((x, aisle / 4, 0.0), np.pi), rng.uniform(0.5, 3.0))
-        put_approaching(site, rng, path, vehicles.car)
+        coming = Pose((x, aisle / 4, 0.0), np.pi)
+        put_approaching(site, rng, coming, rng.uniform(0.5, 3.0), vehicles.car)
     put_vehicle_ahead(site, rng)
     put_row(site, rng, low_thing, rng.choice([-1, 1]) * (aisle / 2 - 0.2), 4.0, 0.0, share=0.4)
     if enters:

@@ -77,8 +77,9 @@ def lay_out_town_street(site: Site, rng: np.random.Generator) -> None:
     put_facades(site, rng, left + pavement, -np.pi / 2)
     put_vehicle_ahead(site, rng)
     for part in site.stretches():
-        put_oncoming(part, rng, lane)
+        # Who crosses comes first: drivers stop for them.
         put_crossers(part, rng, (right + 0.3, left - 0.3))
+        put_oncoming(part, rng, lane)
         put_walkers(part, rng, (1, 4), (right - pavement + 0.5, right - 0.5), KERB_M)
         put_walkers(part, rng, (0, 3), (left + 0.5, left + pavement - 0.5), KERB_M)
         put_cyclist(part, rng, -lane / 2 - 0.1)
@@ -122,7 +123,7 @@ def lay_out_car_park(site: Site, rng: np.random.Generator) -> None:
         site.put(backdrop(rng), end - rng.uniform(32.0, 38.0), y)
     ahead = rng.random()
     if ahead < 0.35:
-        car, facing = vehicles.car(rng), np.pi if rng.random() < 0.5 else 0.0
+        car, facing = vehicles.car(rng).at_rest, np.pi if rng.random() < 0.5 else 0.0
         half_length = float(car.corners[..., 0].max())
         site.put(car, end + half_length, rng.uniform(-0.4, 0.4), facing)
         site.put(backdrop(rng), end + rng.uniform(7, 14), rng.uniform(-3, 3), np.pi)

@@ -10,7 +10,6 @@ from shotenv.world.families.garage import build_ceiling_lamps
 from shotenv.world.families.roads import BEHIND_M, PAINT_M, REACH_M, UNDER_ROAD_M
 from shotenv.world.families.traffic import put_approaching, put_vehicle_ahead, put_walkers
 from shotenv.world.geometry import (
-    Arc,
     Curve,
     Indoor,
     Pose,
@@ -57,7 +56,7 @@ def lay_out_tunnel(site: Site, rng: np.random.Generator) -> None:
     for part in site.stretches():
         if rng.random() < 0.6:
             x = rng.uniform(6.0, 26.0) + 0.5 * part.travel_m
-            put_approaching(part, rng, Arc(Pose((x, lane, 0.0), np.pi), rng.uniform(3.0, 14.0)))
+            put_approaching(part, rng, Pose((x, lane, 0.0), np.pi), rng.uniform(3.0, 14.0))
         put_walkers(part, rng, (0, 2), (centre - half + 0.3, centre - half + 0.5), 0.15)
 
 

@@ -7,19 +7,27 @@ import numpy as np
 from shotenv.world.families.construction import passing_worker
 from shotenv.world.families.garage import YARD_M, Hall, build_wall, hall_over, lay_out_yard
 from shotenv.world.families.roads import PAINT_M, REACH_M
-from shotenv.world.families.traffic import draw_one, put_crossers, put_row, put_walkers
+from shotenv.world.families.traffic import (
+    TRIES,
+    draw_one,
+    put_crossers,
+    put_driver,
+    put_row,
+    put_walkers,
+)
 from shotenv.world.geometry import (
-    Arc,
     Lamp,
     Material,
     Mesh,
+    Mover,
     Pose,
+    Rigid,
     Site,
     lights,
     materials as m,
     meshes,
 )
-from shotenv.world.things import people, wheel
+from shotenv.world.things import axle, people
 from unwrap.support import Range
 
 RACK_DEPTH_M = 1.1
@@ -53,7 +61,7 @@ def lay_out_warehouse(site: Site, rng: np.random.Generator) -> None:
     for part in site.stretches():
         put_crossers(part, rng, (-aisle / 2, aisle / 2), near=0.8, draw=passing_worker)
         put_fork_lift(part, rng, end, aisle)
-        put_walkers(part, rng, (0, 2), (-aisle / 2 + 0.3, aisle / 2 - 0.3), draw=passing_worker)
+        put_walkers(part, rng, (0, 3), (-aisle / 2 + 0.3, aisle / 2 - 0.3), draw=passing_worker)
     for side in (-1, 1):
         y = side * (aisle / 2 + RACK_DEPTH_M / 2 + 0.1)
         put_row(site, rng, floor_thing, side * (aisle / 2 - 0.35), 3.0, 0.0, share=0.35)
@@ -143,13 +151,16 @@ def floor_thing(rng: np.random.Generator) -> Mesh:
 
 def put_fork_lift(site: Site, rng: np.random.Generator, end: float, aisle: float) -> None:
     """Perhaps a fork lift in the aisle, coming, going or standing."""
-    if rng.random() < 0.35:
+    if rng.random() < 0.2:
         return
-    speed = rng.uniform(0.8, 3.0) if rng.random() < 0.7 else 0.0
-    x, yaw = site.travel_m + rng.uniform(4.0, 10.0), rng.integers(2) * np.pi
-    # 0.9 m is half of its width and some clearance.
-    offset = (aisle / 2 - 0.9) * rng.uniform(-0.6, 1.0)
-    site.put_moving(fork_lift(rng), Arc(Pose((min(x, end - 3.0), offset, 0.0), yaw), speed))
+    truck = fork_lift(rng)
+    for _ in range(TRIES):
+        speed = rng.uniform(0.8, 3.0) if rng.random() < 0.8 else 0.0
+        x, yaw = site.travel_m + rng.uniform(4.0, 14.0), rng.integers(2) * np.pi
+        # 0.9 m is half of its width and some clearance.
+        offset = (aisle / 2 - 0.9) * rng.uniform(-0.6, 1.0)
+        if put_driver(site, truck, Pose((min(x, end - 3.0), offset, 0.0), yaw), speed):
+            return
 
 
 def build_high_bays(site: Site, rng: np.random.Generator, end: float, height: float) -> None:
@@ -252,7 +263,7 @@ def pallet_jack(rng: np.random.Generator) -> Mesh:
 
 
 @meshes.thing
-def fork_lift(rng: np.random.Generator) -> Mesh:
+def fork_lift(rng: np.random.Generator) -> Mover:
     """A counterbalanced truck with mast, forks, overhead guard and driver, perhaps a load."""
     paint, dark, tyre = m.MACHINE_PAINT.draw(rng), m.DARK_METAL.draw(rng), m.TYRE.draw(rng)
     lift = rng.uniform(0.08, 0.4)
@@ -276,8 +287,8 @@ def fork_lift(rng: np.random.Generator) -> Mesh:
         *driver,
         meshes.box((1.3, 1.0, 0.06), dark, (-0.1, 0.0, 2.1)),
         meshes.box((0.08, 0.8, 0.5), dark, (1.0, 0.0, lift)),
-        *(wheel(x, side, 0.53, 0.28, tyre, paint) for x in (0.5, -0.7) for side in (-1, 1)),
     ]
     if rng.random() < 0.5:
         parts.append(meshes.at(load(rng), 1.55, 0.0, lift + 0.06))
-    return meshes.join(parts)
+    wheels = (axle(x, 0.53, 0.28, tyre, paint) for x in (0.5, -0.7))
+    return Mover((Rigid(meshes.join(parts)), *wheels))

@@ -1,4 +1,12 @@
 from . import lights as lights, materials as materials, meshes as meshes
+from .gait import (
+    LEAN as LEAN,
+    Leg as Leg,
+    Posture as Posture,
+    Segment as Segment,
+    pedalling_posture as pedalling_posture,
+    walking_posture as walking_posture,
+)
 from .materials import Material as Material
 from .model import (
     MAX_LAMPS as MAX_LAMPS,
@@ -6,15 +14,24 @@ from .model import (
     Lamp as Lamp,
     Light as Light,
     Mesh as Mesh,
+    MovingObject as MovingObject,
     World as World,
 )
 from .motion import (
     Arc as Arc,
     Motion as Motion,
     Pose as Pose,
+    Route as Route,
     ground_speed_m_s as ground_speed_m_s,
     rotation as rotation,
     yaw_rate_rad_s as yaw_rate_rad_s,
+)
+from .mover import (
+    Along as Along,
+    Mover as Mover,
+    Part as Part,
+    Rigid as Rigid,
+    Wheels as Wheels,
 )
 from .road import Curve as Curve
 from .site import Site as Site

@@ -9,10 +9,14 @@ import numpy as np
 
 from shotenv.world.geometry.meshes import area_vectors
 from shotenv.world.geometry.model import Mesh
-from shotenv.world.geometry.motion import Motion, Pose
+from shotenv.world.geometry.motion import Motion, Pose, Route
+from unwrap.support import Range
 
 STEP_M = 0.25
 """Between the points of a curve that are summed up once; in between it is an arc."""
+WAY_STEP_S = 0.05
+"""Between the instants at which the way along a bent route is summed up: at 3 m/s2 it errs by a
+millimetre in between."""
 SAGITTA_M = 0.01
 """How far a straight edge may leave the bend that it stands for."""
 LONGEST_RIGID_M = 12.5
@@ -58,6 +62,14 @@ class Curve:
     def sharpest(self) -> float:
         """Greatest curvature, 1/m."""
         return max((abs(curvature) for _, curvature in self.knots), default=0.0)
+
+    def sharpest_between(self, low_m: float, high_m: float) -> float:
+        """Greatest curvature between two distances along the way, 1/m."""
+        if not self.knots:
+            return 0.0
+        at, curvature = np.array(self.knots).T
+        asked = np.array([low_m, *at[(at > low_m) & (at < high_m)], high_m])
+        return float(np.abs(np.interp(asked, at, curvature, left=0.0, right=0.0)).max())
 
     def _along(self, distance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Like `at`, in the axes of the curve's first point."""
@@ -122,6 +134,33 @@ class Bent:
     def at(self, time_s: float) -> Pose:
         """Pose at `time_s`."""
         return bent_pose(self.road, self.motion.at(time_s))
+
+
+@dataclass(frozen=True)
+class BentRoute(Bent):
+    """A route that is told along a straight road, on the bent one, over a span of time."""
+
+    motion: Route
+    span_s: Range
+
+    def way_m(self, time_s: float) -> float:
+        """Way since time 0, metres: outside in a bend it is longer than along the road."""
+        times, ways, paces = self._table
+        i = int(np.clip((time_s - times[0]) / WAY_STEP_S, 0, len(paces) - 1))
+        return float(ways[i] + paces[i] * (time_s - times[i]))
+
+    @cached_property
+    def _table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Instants, the way at each since time 0, and the speed from one to the next."""
+        start, end = self.span_s
+        # From time 0 on either way, so that it is one of them.
+        before, after = (int(np.ceil(max(0.0, v) / WAY_STEP_S)) + 2 for v in (-start, end))
+        times = WAY_STEP_S * np.arange(-before, after + 1)
+        places = np.array([self.at(time).position_m[:2] for time in times])
+        told = np.diff([self.motion.way_m(time) for time in times])
+        steps = np.sign(told) * np.linalg.norm(np.diff(places, axis=0), axis=1)
+        ways = np.concatenate([[0.0], np.cumsum(steps)])
+        return times, ways - ways[before], steps / WAY_STEP_S
 
 
 def bent_pose(road: Curve, pose: Pose) -> Pose:

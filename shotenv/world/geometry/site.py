@@ -19,19 +19,14 @@ import numpy as np
 from shotenv.config import Family
 from shotenv.world.geometry import meshes
 from shotenv.world.geometry.materials import Material
-from shotenv.world.geometry.model import (
-    Indoor,
-    Lamp,
-    Light,
-    Mesh,
-    MovingObject,
-    World,
-)
-from shotenv.world.geometry.motion import Motion, Pose, rotation
+from shotenv.world.geometry.model import Indoor, Lamp, Light, Mesh, MovingObject, World
+from shotenv.world.geometry.motion import Motion, Pose, Route, rotation
+from shotenv.world.geometry.mover import Mover, swept
 from shotenv.world.geometry.road import (
     LONGEST_RIGID_M,
     STRAIGHT,
     Bent,
+    BentRoute,
     Curve,
     bent_mesh,
     bent_points,
@@ -105,6 +100,8 @@ class Site:
         self.times = np.linspace(0.0, duration_s, instants)
         self.static: list[Mesh] = []
         self.moving: list[MovingObject] = []
+        # Whose pieces `moving` are: on a bent road each is set on its own bent route.
+        self._movers: list[tuple[Mover, Route]] = []
         self.lamps: list[Lamp] = []
         self.indoor: Indoor | None = None
         self.room = np.array([[-np.inf, -np.inf], [np.inf, np.inf]])
@@ -168,16 +165,20 @@ class Site:
             self._add(weathered(meshes.place(mesh, pose), self.weather), counts=False)
         return free
 
-    def put_moving(self, mesh: Mesh, motion: Motion) -> bool:
-        """Add a thing that moves on its lowest point; false if its way is not free.
+    def put_moving(self, mover: Mover, route: Route) -> bool:
+        """Add a thing that moves, its origin on the ground; false if its way is not free.
 
-        What moves stays dry and bare: rain and snow lie on what stands still.
+        All that its parts sweep is one footprint that moves with its body. What moves stays dry
+        and bare: rain and snow lie on what stands still.
         """
-        mesh = meshes.grounded(mesh)
-        poses = [motion.at(time) for time in self.times]
-        free = self._claim(mesh.corners.reshape(-1, 3), len(mesh.corners), poses)
+        span_s = (0.0, self.duration_s)
+        pieces = mover.on(route, span_s)
+        faces = sum(len(piece.mesh.corners) for piece in pieces)
+        outline = swept(pieces, route, span_s, HEADROOM_M)
+        free = self._claim(outline, faces, [route.at(time) for time in self.times])
         if free:
-            self.moving.append(MovingObject(mesh, motion))
+            self.moving += pieces
+            self._movers.append((mover, route))
         return free
 
     def world(self, family: Family, seed: int, light: Light) -> World:
@@ -188,8 +189,11 @@ class Site:
         if self.road.knots:
             anchors = np.repeat(self._anchors_m, [len(mesh.corners) for mesh in self.static])
             static = bent_mesh(self.road, static, anchors)
+            span_s = (0.0, self.duration_s)
             moving = tuple(
-                MovingObject(thing.mesh, Bent(thing.motion, self.road)) for thing in moving
+                piece
+                for mover, route in self._movers
+                for piece in mover.on(BentRoute(route, self.road, span_s), span_s)
             )
             ego = Bent(ego, self.road)
         return World(family, seed, static, moving, light, ego)
@@ -225,6 +229,12 @@ class Site:
         affordable = self._triangles[stretch] + faces <= MAX_TRIANGLES
         if not (inside and low_enough and affordable and self._is_own_ground(taken)):
             return False
+        if len(poses) == 1:
+            # What stands stays straight where the road bends, and reaches off its ground for it:
+            # by the sagitta of its length.
+            (low, high) = taken[0, :, 0]
+            off_m = (high - low) ** 2 / 8 * self.road.sharpest_between(low, high)
+            taken = taken + np.array([[0.0, -off_m], [0.0, off_m]])
         if any(overlap(taken, other) for other in self.taken if len(other) > 1):
             return False
         # Of what stands, only what the whole way comes near has to be compared at each instant.
