@@ -42,12 +42,15 @@ VIEW_RAD = np.radians(40.0)
 """Things are put within this angle of the ego's heading: what the camera sees, and a little more
 that lights and shades it."""
 NEAREST_M = 0.9
-FEWEST_THINGS, MOST_THINGS = 6, 120
+FEWEST_THINGS, MOST_THINGS = 12, 160
 """Things that are drawn; many find no room, above all in small rooms."""
+MOST_OVERHEAD = 8
 MOVER_TRIES = 12
 """Ways that are tried for something that moves, before it is left out."""
-LAMP_W_SR: Range = (0.01, 10.0)
-"""Intensity of a lamp in band: from a garage's weakest tube to a hall's strongest lamp."""
+LAMP_IRRADIANCE: Range = (1e-2, 0.5)
+"""Irradiance in band that one lamp gives what it is for, W m-2; an assumed range."""
+LIT_SHARE = 0.4
+"""What a lamp is for is this share of the place's height and reach away; assumed."""
 LAMP_SIDE_M = 0.2
 """Side of a lamp's square face."""
 
@@ -133,19 +136,28 @@ def build_walls(
 
 def fill(site: Site, rng: np.random.Generator, reach_m: float, ceiling_m: float) -> None:
     """Lamps, then things on the floor, in the air and on the move, few or very many."""
-    for _ in range(rng.integers(MAX_LAMPS + 1) if rng.random() < 0.75 else 0):
+    # Few scenes without any light but the laser's: their gray images tell nothing.
+    lit_share = 0.92 if site.night or site.indoor else 0.4
+    for _ in range(rng.integers(1, MAX_LAMPS + 1) if rng.random() < lit_share else 0):
         put_lamp(site, rng, reach_m, ceiling_m)
     for _ in range(rng.integers(1, 4) if rng.random() < 0.7 else 0):
         put_mover(site, rng, reach_m)
+    for _ in range(rng.integers(MOST_OVERHEAD + 1)):
+        hang(site, rng, reach_m, ceiling_m)
     for _ in range(int(m.log_uniform(rng, (FEWEST_THINGS, MOST_THINGS)))):
         thing, place = any_thing(rng, reach_m), any_place(site, rng, reach_m)
-        top = ceiling_m - float(thing.corners[..., 2].max())
-        height = rng.uniform(0.0, max(top, 0.0)) if rng.random() < 0.3 else 0.0
-        # What hangs over the ego's head stands in nobody's way.
-        if OVERHEAD_M < height < top and rng.random() < 0.5:
-            site.build(meshes.at(thing, *place, height))
-        else:
-            site.put(thing, *place, z=height)
+        floats, share = rng.random(2)
+        # It may float, wherever there is room; its ground is taken all the same.
+        room_m = max(ceiling_m - float(thing.corners[..., 2].max()), 0.0)
+        site.put(thing, *place, z=share * room_m if floats < 0.3 else 0.0)
+
+
+def hang(site: Site, rng: np.random.Generator, reach_m: float, ceiling_m: float) -> None:
+    """Something in the air, above the ego's head too, or nothing where the ceiling is low."""
+    thing, place = any_thing(rng, reach_m), any_place(site, rng, reach_m)
+    highest_m = ceiling_m - float(thing.corners[..., 2].max())
+    if highest_m > OVERHEAD_M:
+        site.build(meshes.at(thing, *place, rng.uniform(OVERHEAD_M, highest_m)))
 
 
 def put_mover(site: Site, rng: np.random.Generator, reach_m: float) -> None:
@@ -171,10 +183,12 @@ def any_place(site: Site, rng: np.random.Generator, reach_m: float) -> tuple[flo
 def put_lamp(site: Site, rng: np.random.Generator, reach_m: float, ceiling_m: float) -> None:
     """A lamp with a glowing face at any height, aimed down or anywhere, wide or narrow."""
     x, y = any_place(site, rng, reach_m)
-    height = rng.uniform(0.3, ceiling_m - 0.2)
+    # Mostly high up, as lamps are.
+    height = float(rng.uniform(0.3, ceiling_m - 0.2, 2).max())
     aim = rng.normal(0.0, 1.0, 3) - (0.0, 0.0, 1.5)
     aim /= np.linalg.norm(aim)
-    intensity, cutoff = m.log_uniform(rng, LAMP_W_SR), rng.uniform(-0.3, 0.9)
+    intensity = lights.intensity_for(rng, LAMP_IRRADIANCE, LIT_SHARE * (ceiling_m + reach_m))
+    cutoff = rng.uniform(-0.3, 0.9)
     radiance = lights.face_radiance(intensity, LAMP_SIDE_M**2)
     face = lamp_face(aim, any_surface(rng).glowing(radiance))
     if height > OVERHEAD_M:
@@ -218,7 +232,7 @@ def any_thing(rng: np.random.Generator, reach_m: float) -> Mesh:
     kinds: tuple[Callable[[np.random.Generator, float], Mesh], ...] = (
         solid_box, cylinder, sphere, turned_solid, lump, panel, panel, shelf, street_thing,
     )  # fmt: skip
-    size_m = m.log_uniform(rng, (0.15, 0.5 + 0.15 * reach_m))
+    size_m = m.log_uniform(rng, (0.1 + 0.01 * reach_m, 0.6 + 0.13 * reach_m))
     return kinds[rng.integers(len(kinds))](rng, size_m)
 
 

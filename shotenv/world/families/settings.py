@@ -128,6 +128,6 @@ SETTINGS: dict[Family, Setting] = {
             Place(clutter.lay_out_hall, (0.0, 6.0), 0.35, 0.2),
             Place(clutter.lay_out_open_ground, (0.0, 12.0), 0.30, 0.1),
         ),
-        sun_night_or_clouds(0.3, 0.4, night_share=0.35),
+        sun_night_or_clouds(0.35, 0.4, night_share=0.25),
     ),
 }
