@@ -8,7 +8,15 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
-from shotenv.bank import Bank, BankError, Clip, KeptPredictions, check_fits, keep_predictions, open_bank
+from shotenv.bank import (
+    Bank,
+    BankError,
+    Clip,
+    KeptPredictions,
+    check_fits,
+    keep_predictions,
+    open_bank,
+)
 from shotenv.config import TRAINING_FAMILIES, EnvConfig
 from shotenv.decision.scenes import Scenes, look_at_scenes
 from shotenv.laser import NetworkWork

@@ -88,7 +88,8 @@ def lay_out_between_walls(
     ahead_m, height_m = m.log_uniform(rng, reach), m.log_uniform(rng, height)
     behind_m = m.log_uniform(rng, (1.0, max(1.5, ahead_m / 2)))
     right_m, left_m = (m.log_uniform(rng, (SIDE_M, max(2.0, ahead_m))) for _ in range(2))
-    low, high = way.min(axis=0) - (behind_m, right_m), way.max(axis=0) + (ahead_m, left_m)
+    low = way.min(axis=0) - np.array([behind_m, right_m])
+    high = way.max(axis=0) + np.array([ahead_m, left_m])
     site.enclose((low[0], high[0]), (low[1], high[1]), height_m)
     build_walls(site, rng, low, high, height_m)
     fill(site, rng, ahead_m, height_m)
@@ -111,9 +112,8 @@ def build_walls(
     rear = meshes.box((WALL_M, y1 - y0, height), any_surface(rng), (x0 - WALL_M / 2, middle[1], 0))
     site.build(rear)
     # Whether there is a gap or not, its edges are drawn: what follows does not depend on it.
-    (gap_y0, gap_y1), (gap_z0, gap_z1) = (
-        np.sort(rng.uniform(*edges, 2)) for edges in ((y0, y1), (0.0, height))
-    )
+    gap_y0, gap_y1 = np.sort(rng.uniform(y0, y1, 2))
+    gap_z0, gap_z1 = np.sort(rng.uniform(0.0, height, 2))
     if has_gap:
         ahead = [(y0, gap_y0, 0.0, height), (gap_y1, y1, 0.0, height),
                  (gap_y0, gap_y1, 0.0, gap_z0), (gap_y0, gap_y1, gap_z1, height)]  # fmt: skip
@@ -213,7 +213,8 @@ def lamp_face(aim: np.ndarray, material: Material) -> Mesh:
 def any_surface(rng: np.random.Generator) -> Material:
     """A surface of any reflectance, plain or patterned; some are glossy, a few retro-reflect."""
     # Uniform in the square root: dark surfaces, which are the hard ones, are then more frequent.
-    albedo = rng.uniform(*np.sqrt(REFLECTANCE), 2) ** 2
+    least, most = np.sqrt(REFLECTANCE)
+    albedo = rng.uniform(least, most, 2) ** 2
     contrast = rng.uniform() if rng.random() < 0.5 else 0.0
     low, high = np.sort([albedo[0], albedo[0] + contrast * (albedo[1] - albedo[0])])
     kind, mirror = rng.random(3), m.log_uniform(rng, (0.02, 0.5))
@@ -310,9 +311,10 @@ def shelf(rng: np.random.Generator, size_m: float) -> Mesh:
     for z in step * np.arange(boards):
         parts.append(meshes.box((depth, width, thick), any_surface(rng), (0.0, 0.0, float(z))))
         for y in np.arange(-width / 2, width / 2, 0.25 * width)[: rng.integers(5)]:
-            x_y_z = (depth, 0.2 * width, (step - thick) * 0.95) * rng.uniform(0.3, 1.0, 3)
+            most = np.array([depth, 0.2 * width, 0.95 * (step - thick)])
+            deep, wide, high = (most * rng.uniform(0.3, 1.0, 3)).tolist()
             base = (0.0, float(y) + 0.125 * width, float(z) + thick + 1e-3)
-            parts.append(meshes.box(tuple(x_y_z.tolist()), any_surface(rng), base))
+            parts.append(meshes.box((deep, wide, high), any_surface(rng), base))
     return meshes.at(meshes.join(parts), 0.0, 0.0, yaw=rng.uniform(-np.pi, np.pi))
 
 
@@ -334,5 +336,11 @@ def street_thing(rng: np.random.Generator, size_m: float) -> Mesh:
     def of_parts(name: str) -> np.ndarray:
         return np.array([getattr(surface, name) for surface in surfaces], np.float32)[part]
 
-    names = ("albedo_low", "albedo_high", "retro", "mirror")
-    return replace(drawn, **{name: of_parts(name) for name in names}, clear=0 * drawn.clear)
+    return replace(
+        drawn,
+        albedo_low=of_parts("albedo_low"),
+        albedo_high=of_parts("albedo_high"),
+        retro=of_parts("retro"),
+        mirror=of_parts("mirror"),
+        clear=np.zeros_like(drawn.clear),
+    )

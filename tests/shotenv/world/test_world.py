@@ -50,7 +50,7 @@ def cast(corners, origin, directions):
     return np.where(hit, distance, np.inf)
 
 
-def view(pose, columns=16, rows=12):
+def view(pose, columns=12, rows=9):
     """Directions of a coarse grid of camera rays, 60 degrees across."""
     half = np.tan(np.radians(30.0))
     y, z = np.meshgrid(np.linspace(half, -half, columns), np.linspace(half, -half, rows) * 0.75)
