@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shotenv.bank import clip_rendering
 from shotenv.bank.clip_jobs import clip_jobs
 from shotenv.bank.clip_rendering import SEEDS_APART, mean_speed_m_s, world_of
 from shotenv.bank.layout import BankError
@@ -38,12 +39,12 @@ def test_in_each_shift_clip_of_starter_the_ego_moves(starter, tmp_path):
 
 
 def test_the_recorded_seed_gives_the_same_world(starter, tmp_path):
-    for job in clip_jobs(starter, tmp_path):
-        if job.split == "shift":
-            world = world_of(job)
-            assert (world.seed - job.seed) % SEEDS_APART == 0
-            again = draw_world(job.family, world.seed, starter.world)
-            assert np.array_equal(again.static.corners, world.static.corners)
+    jobs = [job for job in clip_jobs(starter, tmp_path) if job.split == "shift"]
+    for job in jobs[:4]:
+        world = world_of(job)
+        assert (world.seed - job.seed) % SEEDS_APART == 0
+        again = draw_world(job.family, world.seed, starter.world)
+        assert np.array_equal(again.static.corners, world.static.corners)
 
 
 def test_elsewhere_and_where_it_may_stand_the_world_is_that_of_the_seed(starter, tmp_path):
@@ -67,7 +68,8 @@ def test_speed_counts_whatever_the_direction(starter):
     assert mean_speed_m_s(Moves, starter) == 0.0
 
 
-def test_a_speed_that_no_ego_reaches_is_named(starter, tmp_path):
+def test_a_speed_that_no_ego_reaches_is_named(starter, tmp_path, monkeypatch):
+    monkeypatch.setattr(clip_rendering, "MOST_WORLDS", 3)
     fast = merged(starter, {"shift_mean_speed_m_s": 14.9})
     job = next(job for job in clip_jobs(fast, tmp_path) if job.family == "warehouse")
     with pytest.raises(BankError, match=r"shift_mean_speed_m_s is 14\.9, .* of warehouse"):

@@ -61,11 +61,11 @@ def test_a_fused_network_normalises_nothing_and_leaves_the_network_alone():
     assert all(torch.equal(weights[name], tensor) for name, tensor in network.state_dict().items())
 
 
-OURS = ("tofregnet", "toffusionnet")
+EVERYDAY = ("tofregnet", "toffusionnet")
 TRACED = [name for name in PLACES if build_network(name, Settings(width=4)).can_be_traced]
 
 
-# Each takes two seconds to compile: every day those that are shipped, one for gray and one for samples.
+# Each takes two seconds to compile: every day one for gray and one for samples.
 @pytest.mark.parametrize(
     "name",
     [name if name in OURS else pytest.param(name, marks=pytest.mark.slow) for name in TRACED],
