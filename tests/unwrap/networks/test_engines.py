@@ -68,7 +68,7 @@ TRACED = [name for name in PLACES if build_network(name, Settings(width=4)).can_
 # Each takes two seconds to compile: every day one for gray and one for samples.
 @pytest.mark.parametrize(
     "name",
-    [name if name in OURS else pytest.param(name, marks=pytest.mark.slow) for name in TRACED],
+    [name if name in EVERYDAY else pytest.param(name, marks=pytest.mark.slow) for name in TRACED],
 )
 @torch.inference_mode()
 def test_a_compiled_network_computes_the_same(name):
