@@ -27,13 +27,10 @@ class ClipJob:
 
 
 def clip_jobs(config: BankConfig, folder: Path) -> tuple[ClipJob, ...]:
-    """Clips of the bank in `folder`, in their order: split by split, the families in turn.
-
-    The held-out families come last, so that seeds of the others do not depend on `shift_clips`.
-    """
+    """Clips of the bank in `folder`, in the order of `BankConfig.clips`, the families in turn."""
     kinds = [
         (split, family)
-        for split, (count, families) in config.clips.items()
+        for split, count, families in config.clips
         for _ in range(count)
         for family in families
     ]
