@@ -1,4 +1,5 @@
 from .bank import BankConfig as BankConfig, CameraConfig as CameraConfig, WorldConfig as WorldConfig
+from .emission import EmissionConfig as EmissionConfig
 from .env import EnvConfig as EnvConfig, RewardConfig as RewardConfig
 from .families import Family as Family, Split as Split
 from .keywords import env_config as env_config

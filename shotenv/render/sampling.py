@@ -54,6 +54,29 @@ class Sampler:
         # XOR with a number below the next power of two shuffles and keeps the sequence's blocks.
         self._shuffle_mask = (1 << (count - 1).bit_length()) - 1
 
+    def in_pixel(self):
+        """Where in its pixel each lane's ray goes; a lone sample goes through the centre.
+
+        One point of a quarter, turned by right angles about the centre for the further samples:
+        each is anywhere with the same chance, and all that is linear over the pixel cancels in
+        the mean of four (of two: opposite ones), such as the distance of a slanted road.
+        """
+        if self._samples == 1:
+            return mi.Point2f(0.5, 0.5)
+        turned = self._sample // 4
+        order = mi.Float(turned)
+        x, y = (0.5 * _wrap(order * step + self._rng.next_float32()) for step in _STEP_2D)
+        # Opposite ones first, so that two samples cancel as well.
+        quarter = self._sample % 4
+        swap, flip = quarter >= 2, (quarter % 2) == 1
+        x, y = dr.select(swap, -y, x), dr.select(swap, x, y)
+        return mi.Point2f([0.5 + dr.select(flip, -side, side) for side in (x, y)])
+
+    def next_block(self, size: int, count: int):
+        """First of `size` neighbours in a sequence of `count`; those of a pixel's samples adjoin."""
+        first = mi.UInt32(self._rng.next_float32() * count)
+        return (first + self._sample * size) % count
+
     def next_1d(self):
         """A number in [0, 1)."""
         return _wrap(self._order() * _STEP_1D + self._rng.next_float32())
@@ -79,3 +102,12 @@ class Sampler:
 
 def _wrap(value):
     return value - dr.floor(value)
+
+
+def plane_sequence(count: int, seed: int) -> np.ndarray:
+    """Points [count, 2] of the unit square that cover it evenly, shifted at random by `seed`.
+
+    So do any neighbours among them.
+    """
+    shift = np.random.default_rng(seed).random(2)
+    return (np.arange(count)[:, None] * _STEP_2D + shift) % 1.0
