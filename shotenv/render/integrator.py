@@ -36,6 +36,13 @@ from shotenv.render.sampling import Lanes, Sampler
 from shotenv.render.scene import SURFACE_OFFSET_M, Hit, Scene, Surroundings
 from shotenv.world.geometry import World
 
+VIEW_RAYS = 4
+"""Rays of each path through its pixel for the laser's direct return: it is most of its light, and
+where an edge crosses a pixel, its share of the pixel decides the distance."""
+SKY_RAYS = 4
+"""Rays of each path to the sky from the first surface that is seen."""
+
+
 @dataclass(frozen=True)
 class Traced:
     """Light of T instants of one world.
@@ -156,19 +163,21 @@ class _Onward:
         )
 
 
-LEAST_CHANCE, MOST_CHANCE = 0.5, 0.75
-"""Chance, at least and at most, of going on mirrored or straight through where a surface does so
-besides scattering: what a wet road mirrors is bright and sharp, what it scatters dim and smooth, so
-that chances in proportion to the shares would leave the first to luck."""
-
-
 def _chances(hit: Hit):
-    """Chances of going on mirrored, straight through, and diffusely; their sum is 1."""
-    straight = hit.mirror + hit.clear
-    mixed = dr.clip(straight, LEAST_CHANCE, MOST_CHANCE)
-    chance = dr.select(straight > 0, dr.select(hit.diffuse > 0, mixed, 1), 0)
-    scale = dr.select(straight > 0, chance / straight, 0)
-    return hit.mirror * scale, hit.clear * scale, 1 - chance
+    """Chances of going on mirrored, straight through, and diffusely; their sum is 1.
+
+    Whole quarters, so that of four samples always as many go each way. Half of them or more go on
+    mirrored or straight through where a surface does so besides scattering: what a wet road
+    mirrors is bright and sharp, what it scatters dim and smooth, so that chances in proportion to
+    the shares would leave the first to luck.
+    """
+    mirrors, clears, scatters = hit.mirror > 0, hit.clear > 0, hit.diffuse > 0
+    both = mirrors & clears
+    straight = dr.select(scatters, dr.select(both, 0.75, 0.5), 1)
+    straight = dr.select(mirrors | clears, straight, 0)
+    lesser = dr.select(both, 0.25, 0)
+    mirror = dr.select(mirrors & (~clears | (hit.mirror > hit.clear)), straight - lesser, lesser)
+    return mirror, straight - mirror, 1 - straight
 
 
 def _follow(
@@ -185,7 +194,8 @@ def _follow(
     """
     passive, instant = sources.passive, lanes.instant
     eye = sources.eye
-    origin, direction = eye.rays(lanes, sampler.in_pixel())
+    place, *further = sampler.in_pixel(VIEW_RAYS)
+    origin, direction = eye.rays(lanes, place)
     intensity = eye.intensity(direction, instant)
     hit = scene.hit(origin, direction, instant, mi.Bool(True), coherent=True)
     light = _Gathered(
@@ -194,6 +204,8 @@ def _follow(
         active=mi.Float(0),
         correlation=mi.Float(0),
     )
+    for place in further:
+        _add_first_return(light, scene, sources, lanes, place)
     throughput, walked_m = mi.Float(1), hit.distance_m
     # Share of the laser's light on the way that the camera looks; 0 once that way has scattered.
     # `bent`: a mirror or a diffuse surface lies behind, so that the laser shines on the next one
@@ -207,6 +219,8 @@ def _follow(
         laser_on, passive_on = hit.valid & sources.laser_on, hit.valid & sources.passive_on
         returned = along_view(hit, intensity, direction, walked_m)
         returned = dr.select(laser_on, throughput * way_back * returned, 0)
+        if bounce == 0:
+            returned /= VIEW_RAYS
         light.add_active(returned, 2 * walked_m)
         if bounce > 0:
             lit = laser_on & bent
@@ -229,13 +243,21 @@ def _follow(
         aim, which = sampler.next_2d(), sampler.next_1d()
         number, sample = sampler.next_choice(), sampler.next_2d()
         onward = _Onward.drawn(hit, direction, number, sample)
+        if bounce == 0:
+            aimed = ~passive.sky_is_aimed_at(hit)
+            sky = passive.sky_irradiance(
+                scene, hit, instant, sampler.next_points(SKY_RAYS), passive_on & aimed
+            )
+            light.ambient += sky * hit.diffuse * hit.albedo * dr.inv_pi
         numbers = aim, which, onward.number
         irradiance = passive.irradiance(scene, hit, instant, numbers, passive_on)
         # The surface reflects to the camera whatever way the path goes on.
         light.ambient += throughput * irradiance * hit.diffuse * hit.albedo * dr.inv_pi
         throughput *= onward.kept
         seeks_sky = passive_on & dr.select(
-            onward.scatters, ~passive.sky_is_aimed_at(hit), seeks_sky | ~onward.passes
+            onward.scatters,
+            ~passive.sky_is_aimed_at(hit) & (bounce > 0),
+            seeks_sky | ~onward.passes,
         )
         direction = onward.direction
         if bounce + 1 < bounces:
@@ -255,6 +277,17 @@ def _follow(
             free = scene.transmission(onward.start, direction, reach, instant, seeks_sky)
         light.ambient += throughput * passive.sky(direction) * free
     return light
+
+
+def _add_first_return(
+    light: _Gathered, scene: Scene, sources: _Sources, lanes: Lanes, place
+) -> None:
+    """Add what the surface on another ray of the pixel returns of the laser directly."""
+    eye, instant = sources.eye, lanes.instant
+    origin, direction = eye.rays(lanes, place)
+    hit = scene.hit(origin, direction, instant, sources.laser_on, coherent=True)
+    returned = along_view(hit, eye.intensity(direction, instant), direction, hit.distance_m)
+    light.add_active(dr.select(hit.valid, returned, 0) / VIEW_RAYS, 2 * hit.distance_m)
 
 
 def _true_distance(scene: Scene, eye: Pinhole, instants: int, camera: CameraConfig):
