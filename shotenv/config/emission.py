@@ -37,7 +37,8 @@ class EmissionConfig(Section):
         75.0, gt=1.0, le=170.0, description="full width at half maximum of a Gaussian profile"
     )
     angle_deg: tuple[float, ...] = Field(
-        (), description="angles from the axis of a table, rising from 0; beyond the last is no light"
+        (),
+        description="angles from the axis of a table, rising from 0; beyond the last is no light",
     )
     intensity: tuple[float, ...] = Field(
         (), description="relative radiant intensity at each of `angle_deg`, linear in between"

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -113,7 +112,9 @@ def draw_directions(camera: CameraConfig, points: np.ndarray) -> Directions:
     # Cells of all columns are one rising list, so that one search finds the row in its column.
     target = left_of[column] + points[:, 1] * mass
     cell = np.clip(
-        np.searchsorted(grid.cells, target, side="right"), column * _CELLS, (column + 1) * _CELLS - 1
+        np.searchsorted(grid.cells, target, side="right"),
+        column * _CELLS,
+        (column + 1) * _CELLS - 1,
     )
     below = np.concatenate([[0.0], grid.cells])
     share = below[cell + 1] - below[cell]

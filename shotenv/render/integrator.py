@@ -36,10 +36,10 @@ from shotenv.render.sampling import Lanes, Sampler
 from shotenv.render.scene import SURFACE_OFFSET_M, Hit, Scene, Surroundings
 from shotenv.world.geometry import World
 
-VIEW_RAYS = 4
+VIEW_RAYS = 3
 """Rays of each path through its pixel for the laser's direct return: it is most of its light, and
 where an edge crosses a pixel, its share of the pixel decides the distance."""
-SKY_RAYS = 4
+SKY_RAYS = 3
 """Rays of each path to the sky from the first surface that is seen."""
 
 
@@ -173,7 +173,8 @@ def _chances(hit: Hit):
     """
     mirrors, clears, scatters = hit.mirror > 0, hit.clear > 0, hit.diffuse > 0
     both = mirrors & clears
-    straight = dr.select(scatters, dr.select(both, 0.75, 0.5), 1)
+    most = both | (hit.mirror + hit.clear > hit.diffuse)
+    straight = dr.select(scatters, dr.select(most, 0.75, 0.5), 1)
     straight = dr.select(mirrors | clears, straight, 0)
     lesser = dr.select(both, 0.25, 0)
     mirror = dr.select(mirrors & (~clears | (hit.mirror > hit.clear)), straight - lesser, lesser)
@@ -196,7 +197,7 @@ def _follow(
     eye = sources.eye
     place, *further = sampler.in_pixel(VIEW_RAYS)
     origin, direction = eye.rays(lanes, place)
-    intensity = eye.intensity(direction, instant)
+    intensity, share = eye.intensity(direction, instant), 1 / (1 + len(further))
     hit = scene.hit(origin, direction, instant, mi.Bool(True), coherent=True)
     light = _Gathered(
         modulation=sources.modulation,
@@ -205,7 +206,7 @@ def _follow(
         correlation=mi.Float(0),
     )
     for place in further:
-        _add_first_return(light, scene, sources, lanes, place)
+        _add_first_return(light, scene, sources, lanes, place, share)
     throughput, walked_m = mi.Float(1), hit.distance_m
     # Share of the laser's light on the way that the camera looks; 0 once that way has scattered.
     # `bent`: a mirror or a diffuse surface lies behind, so that the laser shines on the next one
@@ -220,7 +221,7 @@ def _follow(
         returned = along_view(hit, intensity, direction, walked_m)
         returned = dr.select(laser_on, throughput * way_back * returned, 0)
         if bounce == 0:
-            returned /= VIEW_RAYS
+            returned *= share
         light.add_active(returned, 2 * walked_m)
         if bounce > 0:
             lit = laser_on & bent
@@ -280,14 +281,14 @@ def _follow(
 
 
 def _add_first_return(
-    light: _Gathered, scene: Scene, sources: _Sources, lanes: Lanes, place
+    light: _Gathered, scene: Scene, sources: _Sources, lanes: Lanes, place, share: float
 ) -> None:
-    """Add what the surface on another ray of the pixel returns of the laser directly."""
+    """Add a share of what the surface on another ray of the pixel returns of the laser directly."""
     eye, instant = sources.eye, lanes.instant
     origin, direction = eye.rays(lanes, place)
     hit = scene.hit(origin, direction, instant, sources.laser_on, coherent=True)
     returned = along_view(hit, eye.intensity(direction, instant), direction, hit.distance_m)
-    light.add_active(dr.select(hit.valid, returned, 0) / VIEW_RAYS, 2 * hit.distance_m)
+    light.add_active(dr.select(hit.valid, returned, 0) * share, 2 * hit.distance_m)
 
 
 def _true_distance(scene: Scene, eye: Pinhole, instants: int, camera: CameraConfig):

@@ -17,14 +17,13 @@ import mitsuba as mi
 
 from shotenv.render.geometry import REACH_M
 from shotenv.render.instants import Instants
-from shotenv.render.modulation import Modulation
 from shotenv.render.pinhole import Pinhole
 from shotenv.render.sampling import plane_sequence
 from shotenv.render.scene import SURFACE_OFFSET_M, Hit, Scene
 
 POINTS = 4096
 """Points that the laser shines on, at each instant: more than a hundred times those of a pixel."""
-POINTS_PER_PATH = 16
+POINTS_PER_PATH = 12
 """How many of them light each surface that a path meets. Their sum costs arithmetic only; one ray
 asks for the shadow of all."""
 _RETRO_COS = 0.5
@@ -124,7 +123,7 @@ class LitPoints:
         first, number = numbers
         albedo = hit.diffuse * hit.albedo * dr.inv_pi
         reach = chance * dr.inv_pi
-        row = instant * POINTS
+        row, laser = instant * POINTS, eye.position(instant)
 
         def one(index):
             """Radiance by one point were nothing between, its direction, and both distances."""
@@ -139,7 +138,7 @@ class LitPoints:
             facing = leaving * arriving / square
             density = dr.fma(POINTS_PER_PATH, place.w, reach * facing)
             radiance = albedo * facing * face.w * place.w / dr.maximum(density, 1e-20)
-            path_m = walked_m + square * scale + eye.distance_m(place.xyz, instant)
+            path_m = walked_m + square * scale + dr.norm(place.xyz - laser)
             return radiance, way * scale, square * scale, path_m
 
         def more(index, *_):

@@ -38,7 +38,7 @@ class Pinhole:
         up = down * (1 - row * (2 / camera.height))
         ahead, leftward, upward = self._axes_at(lanes.instant)
         direction = dr.normalize(ahead + left * leftward + up * upward)
-        return self._position_at(lanes.instant), direction
+        return self.position(lanes.instant), direction
 
     def emitted(self, points: np.ndarray, index, instant) -> tuple[Any, Any, Any]:
         """Origin and direction of rays of the laser's light, and their density per solid angle.
@@ -49,7 +49,7 @@ class Pinhole:
         along, left, up = dr.gather(mi.Vector3f, upload(drawn.axes), index)
         ahead, leftward, upward = self._axes_at(instant)
         direction = along * ahead + left * leftward + up * upward
-        return self._position_at(instant), direction, dr.gather(mi.Float, upload(drawn.per_sr), index)
+        return self.position(instant), direction, dr.gather(mi.Float, upload(drawn.per_sr), index)
 
     def intensity(self, direction, instant):
         """Radiant intensity of the laser along a unit direction, W sr-1 per watt."""
@@ -58,16 +58,13 @@ class Pinhole:
 
     def laser(self, point, instant) -> tuple[Any, Any, Any]:
         """Radiant intensity (W sr-1 per watt) towards `point`, direction from it, distance."""
-        away = self._position_at(instant) - point
+        away = self.position(instant) - point
         distance = dr.norm(away)
         direction = away / distance
         return self.intensity(-direction, instant), direction, distance
 
-    def distance_m(self, point, instant):
-        """Distance of `point` from the laser and the camera."""
-        return dr.norm(self._position_at(instant) - point)
-
-    def _position_at(self, instant):
+    def position(self, instant):
+        """Where camera and laser are."""
         return dr.gather(mi.Point3f, self._position, instant)
 
     def _axes_at(self, instant):

@@ -55,12 +55,14 @@ class Sampler:
         self._shuffle_mask = (1 << (count - 1).bit_length()) - 1
 
     def in_pixel(self, count: int) -> list[Any]:
-        """`count` points of its pixel for each lane; those of a lone sample start at the centre.
+        """`count` points of its pixel for each lane; a lone sample has its centre only.
 
         Points of one quarter, turned by right angles about the centre for neighbouring samples:
         each is anywhere with the same chance, and all that is linear over the pixel cancels in
         the mean of four (of two: opposite ones), such as the distance of a slanted road.
         """
+        if self._samples == 1:
+            return [mi.Point2f(0.5, 0.5)]
         turn, shift = self._rng.next_uint32(), [self._rng.next_float32() for _ in _STEP_2D]
         # Opposite ones first, so that two samples cancel as well.
         quarter = (self._sample ^ turn) % 4
@@ -74,8 +76,6 @@ class Sampler:
             )
             x, y = dr.select(swap, -y, x), dr.select(swap, x, y)
             points.append(mi.Point2f([0.5 + dr.select(flip, -side, side) for side in (x, y)]))
-        if self._samples == 1:
-            points[0] = mi.Point2f(0.5, 0.5)
         return points
 
     def next_block(self, size: int, count: int):
