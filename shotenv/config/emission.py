@@ -38,7 +38,7 @@ class EmissionConfig(Section):
     )
     angle_deg: tuple[float, ...] = Field(
         (),
-        description="angles from the axis of a table, rising from 0; beyond the last is no light",
+        description="angles from the axis of a table, from 0 up; beyond the last is no light",
     )
     intensity: tuple[float, ...] = Field(
         (), description="relative radiant intensity at each of `angle_deg`, linear in between"
