@@ -111,11 +111,8 @@ def draw_directions(camera: CameraConfig, points: np.ndarray) -> Directions:
     along = (points[:, 0] - left_of[column]) / mass
     # Cells of all columns are one rising list, so that one search finds the row in its column.
     target = left_of[column] + points[:, 1] * mass
-    cell = np.clip(
-        np.searchsorted(grid.cells, target, side="right"),
-        column * _CELLS,
-        (column + 1) * _CELLS - 1,
-    )
+    cell = np.searchsorted(grid.cells, target, side="right")
+    cell = np.clip(cell, column * _CELLS, (column + 1) * _CELLS - 1)
     below = np.concatenate([[0.0], grid.cells])
     share = below[cell + 1] - below[cell]
     upward = (target - below[cell]) / share
@@ -126,7 +123,7 @@ def draw_directions(camera: CameraConfig, points: np.ndarray) -> Directions:
     axes = np.stack([cosine * np.cos(azimuth), cosine * np.sin(azimuth), sine], axis=1)
     # Azimuth and the sine of elevation are a map of the sphere that keeps areas.
     area = size**2 * grid.azimuth_rad * grid.sine
-    return Directions(np.float32(axes), np.float32(share / area))
+    return Directions(axes.astype(np.float32), (share / area).astype(np.float32))
 
 
 @dataclass(frozen=True)
@@ -189,7 +186,7 @@ def emitted_sr(camera: CameraConfig) -> float:
         # One quarter of the image stands for all four.
         weight *= 4 * np.outer(x_weight, y_weight).ravel()
     else:
-        corners = (0.0, math.pi / 2)
+        corners: tuple[float, ...] = (0.0, math.pi / 2)
         if emission.profile == "table":
             corners = tuple(math.radians(angle) for angle in emission.angle_deg)
         angle, weight = _nodes(corners)

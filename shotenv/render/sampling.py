@@ -79,7 +79,7 @@ class Sampler:
         return points
 
     def next_block(self, size: int, count: int):
-        """First of `size` neighbours in a sequence of `count`; those of a pixel's samples adjoin."""
+        """First of `size` neighbours in a sequence of `count`; a pixel's samples take turns."""
         first = mi.UInt32(self._rng.next_float32() * count)
         return (first + self._sample * size) % count
 
@@ -109,7 +109,7 @@ class Sampler:
         return mi.Point2f([_wrap(order * step + self._rng.next_float32()) for step in _STEP_2D])
 
     def next_points(self, count: int) -> list[Any]:
-        """`count` points of the unit square, further ones of one sequence over a pixel's samples."""
+        """`count` points of the unit square; those of a pixel's samples are one sequence."""
         shift = [self._rng.next_float32() for _ in _STEP_2D]
         return [
             mi.Point2f(
