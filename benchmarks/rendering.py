@@ -29,11 +29,13 @@ from shotenv.config import (
 from shotenv.render import FrameRenderer, Instants
 from shotenv.render.backend import start_mitsuba
 from shotenv.world import draw_world
-from shotenv.world.geometry import Mesh, World
+from shotenv.world.geometry import Mesh, World, rotation
 from unwrap.signal import Shots
 
 GOALS = {(160, 120): 1.3, (320, 240): 1.15}
 """Largest ratio by width and height (assumed): in a small frame building scenes weighs more."""
+CONE_DEG = 36.0
+"""Half angle of the laser's cone where efficiencies are compared: just wider than the view."""
 PATH_SAMPLES = 32
 """Paths of a pixel of the path integrator where efficiencies are compared."""
 ROUNDS = 9
@@ -76,8 +78,9 @@ def _race(world: World, camera: CameraConfig, sensor: SensorConfig, goal: float)
 def _efficiency(light: str, family: Family, goal: float) -> dict[str, Any]:
     """Efficiency for one kind of light in a world of matte surfaces, over the path integrator's."""
     world = _matte(_without_lamps(draw_world(family, SEED, WorldConfig())))
-    # Where the laser is bare, its light is that of Mitsuba's point but for what is out of view.
-    camera = CameraConfig(emission=EmissionConfig(edge_softness_deg=0.0))
+    # A round cone, which Mitsuba's spot has too.
+    cone = EmissionConfig(profile="table", angle_deg=(0.0, CONE_DEG), intensity=(1.0, 1.0))
+    camera = CameraConfig(emission=cone)
     path, ours = _path_of(light, world, camera), _trace_of(light, world, camera)
     error, path_error = (_relative_squared_error(render) for render in (ours, path))
     times = alternating(ours, path, 5)
@@ -108,19 +111,30 @@ def _path_of(light: str, world: World, camera: CameraConfig) -> Callable[[int], 
     """The same by Mitsuba's path integrator, in about the same time."""
     mitsuba = start_mitsuba()
     from shotenv.render import stock_path, stock_scene
-    from shotenv.render.beam import emitted_sr
 
     if light == "laser":
         dark = replace(world.light, sun_irradiance=0.0, sky_horizon=0.0, sky_zenith=0.0)
-        place = list(world.ego.at(0.0).position_m)
-        bare = {"type": "point", "position": place, "intensity": 1 / emitted_sr(camera)}
-        scene = stock_scene(replace(world, light=dark), 0.0, camera, laser=bare)
+        scene = stock_scene(replace(world, light=dark), 0.0, camera, laser=_spot(world, camera))
     else:
         scene = stock_scene(world, 0.0, camera)
     integrator = stock_path(camera)
     return lambda seed: np.array(
         mitsuba.render(scene, integrator=integrator, spp=PATH_SAMPLES, seed=seed)
     )[..., 0]
+
+
+def _spot(world: World, camera: CameraConfig) -> dict[str, Any]:
+    """The laser as an emitter of Mitsuba."""
+    mitsuba = start_mitsuba()
+    from shotenv.render.beam import emitted_sr
+
+    pose = world.ego.at(0.0)
+    eye, (ahead, _, up) = np.asarray(pose.position_m), rotation(pose).T
+    turn = mitsuba.ScalarTransform4f().look_at(
+        origin=eye.tolist(), target=(eye + ahead).tolist(), up=up.tolist()
+    )
+    edge = {"cutoff_angle": CONE_DEG, "beam_width": CONE_DEG - 0.01}
+    return {"type": "spot", "to_world": turn, "intensity": 1 / emitted_sr(camera), **edge}
 
 
 def _relative_squared_error(render: Callable[[int], np.ndarray]) -> float:
