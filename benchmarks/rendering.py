@@ -41,7 +41,7 @@ PATH_SAMPLES = 32
 ROUNDS = 9
 """Pairs of which the median ratio counts."""
 EFFICIENCY_WORLDS: dict[str, tuple[Family, float]] = {
-    "laser": ("garage", 5.0),
+    "laser": ("garage", 4.0),
     "ambient": ("overcast_street", 0.5),
 }
 """Kind of light to the family of the world in which it is compared, and the least efficiency over
