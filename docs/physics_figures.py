@@ -15,7 +15,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import torch
-from figures import decoding, laser, light, sensor
+from figures import decoding, laser, light, renderer, sensor
 from figures.stage import Made, Row
 
 DOCS = Path(__file__).parent
@@ -25,8 +25,10 @@ FIGURES: tuple[Callable[[], Made], ...] = (
     light.signal,
     decoding.wiggle,
     light.multipath,
+    renderer.emission,
     light.panes,
     light.motion,
+    renderer.renderer_error,
     sensor.photon_transfer,
     sensor.depth_noise,
     sensor.full_well,

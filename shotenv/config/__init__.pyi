@@ -1,4 +1,5 @@
 from .bank import BankConfig as BankConfig, CameraConfig as CameraConfig, WorldConfig as WorldConfig
+from .emission import EmissionConfig as EmissionConfig
 from .env import EnvConfig as EnvConfig, RewardConfig as RewardConfig
 from .families import (
     TRAINING_FAMILIES as TRAINING_FAMILIES,

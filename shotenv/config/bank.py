@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from pydantic import Field, model_validator
 
+from shotenv.config.emission import EmissionConfig
 from shotenv.config.families import (
     FAMILIES,
     SHIFT_FAMILIES,
@@ -16,7 +19,7 @@ from unwrap.support import NonNegative, Positive, Range, Section, check_range
 
 
 class CameraConfig(Section):
-    """Image geometry and the instants that are rendered."""
+    """Image geometry, the laser beside the lens, and the instants that are rendered."""
 
     width: int = Field(160, ge=16, le=1280, description="pixels across")
     height: int = Field(120, ge=16, le=960, description="pixels down")
@@ -24,6 +27,20 @@ class CameraConfig(Section):
     samples_per_pixel: int = Field(4, ge=1, description="camera rays per pixel and instant")
     gray_instants: int = Field(4, ge=1, le=16, description="instants that make the gray image")
     bounces: int = Field(2, ge=1, le=8, description="surface hits of a light path")
+    emission: EmissionConfig = EmissionConfig()
+
+    @property
+    def half_extents(self) -> tuple[float, float]:
+        """Tangents of half the horizontal and half the vertical field of view; square pixels."""
+        across = math.tan(math.radians(self.horizontal_fov_deg) / 2)
+        return across, across * self.height / self.width
+
+    @model_validator(mode="after")
+    def _emission_covers_the_view(self) -> CameraConfig:
+        across, down = self.half_extents
+        wider = math.degrees(math.atan(max(across, down)))
+        self.emission.check_covers(wider, math.degrees(math.atan(math.hypot(across, down))))
+        return self
 
 
 class WorldConfig(Section):

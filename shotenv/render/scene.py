@@ -116,6 +116,12 @@ class Scene:
             diffuse=1 - rest[2] - rest[3],
         )
 
+    def distance_m(self, origin, direction, instant):
+        """Distance to the nearest surface along each of neighbouring rays; infinite at none."""
+        active = mi.Bool(True)
+        near = self._nearest(origin, direction, mi.Float(REACH_M), instant, active, coherent=True)
+        return dr.select(near.valid, near.distance_m, dr.inf)
+
     def transmission(self, origin, direction, length, instant, active):
         """Share of the light that comes through `length` metres of each ray (at most `REACH_M`).
 
