@@ -96,7 +96,9 @@ class SensorConfig(Section):
     )
     gray_max_exposure_s: Positive = Field(5e-3, description="longest gray exposure, s")
     gray_target: Share = Field(0.3, description="mean of full scale aimed at by gray exposure")
-    min_snr: NonNegative = Field(1.0, description="signal-to-noise below which depth is invalid")
+    min_snr: NonNegative = Field(
+        3.0, description="decoded amplitude over a sample's noise below which depth is invalid"
+    )
     saturation_range_m: Positive = Field(
         6.2, description="d_sat of eq. 6 and 8: wrapped distances from here on are not trusted, m"
     )

@@ -220,8 +220,16 @@ def mark_scored_(
 
 
 @loop
-def noise_by_gray_(gray: Array, variance_per_word: Array, dark: np.float32, noise: Array) -> None:
-    """Noise of a sample in the light that a gray image shows.
+def noise_by_gray_(
+    gray: Array,
+    variance_per_word: Array,
+    dark: np.float32,
+    offset_variance: Array,
+    offset_per_word: Array,
+    most_offset: np.float32,
+    noise: Array,
+) -> None:
+    """Noise of a sample in the light that a gray image shows, and offset that counts as noise.
 
     Parameters
     ----------
@@ -230,6 +238,11 @@ def noise_by_gray_(gray: Array, variance_per_word: Array, dark: np.float32, nois
         Of a sample, per word of the gray image.
     dark : float32
         Variance of a sample without light.
+    offset_variance, offset_per_word : float32 [B]
+        Variance of the offset, and offset that ambient light adds per word of the gray image; 0
+        where offsets cancel.
+    most_offset : float32
+        Where ambient light fills the taps.
     noise : float32 [B, H, W]
         Standard deviation; is written.
     """
@@ -237,5 +250,10 @@ def noise_by_gray_(gray: Array, variance_per_word: Array, dark: np.float32, nois
     for b in range(frames):
         for i in range(rows):
             for j in range(columns):
-                variance = np.float32(gray[b, i, j]) * variance_per_word[b] + dark
-                noise[b, i, j] = np.sqrt(variance)
+                word = np.float32(gray[b, i, j])
+                offset = min(word * offset_per_word[b], most_offset)
+                known = word * variance_per_word[b] + dark
+                # Twice: an offset stands in both samples, and lengthens them in one direction as
+                # noise of that variance would in both.
+                offsets = offset_variance[b] + offset * offset
+                noise[b, i, j] = np.sqrt(known + offsets + offsets)
