@@ -16,9 +16,13 @@ from unwrap.signal import RawFrame, Shots, samples_at
 NoiseSource = Literal["told", "opposite samples", "dark noise"]
 REACH_PX = 5
 """Neighbours to each side that a pixel's noise is measured over; assumed. 11 x 11 residuals give a
-standard deviation within about a tenth."""
+standard deviation within about a fifteenth."""
 NORMAL_MEDIAN = 0.6745
 """Median of |x| of a standard normal x."""
+OUTLIER, KEPT_VARIANCE = 3.0, 0.9733
+"""Standard deviations beyond which a residual is an outlier; variance of a normal x within them."""
+OUTLIER, KEPT_VARIANCE = 3.0, 0.9733
+"""Standard deviations from which on a residual is an outlier; variance of a normal x within."""
 LEAST_NOISE_LSB = 1 / math.sqrt(12)
 """Rounding to words, which no sample is without."""
 
@@ -55,9 +59,9 @@ def opposite_samples_noise_lsb(raw: RawFrame) -> Tensor:
     """Noise of one sample by what is left of opposite ones, float32 [B, H, W], LSB.
 
     Light and its overtones cancel in D0 + D2 and in D1 + D3, the pixel's offset in their
-    difference: (D0 + D2 - D1 - D3) / 2 is as noisy as one sample and has mean 0. Its standard
-    deviation is that of a normal distribution with the median of its magnitude around the pixel,
-    over both frequencies where there are eight samples. A median hardly sees edges that moved.
+    difference: (D0 + D2 - D1 - D3) / 2 is as noisy as one sample and has mean 0. Its rms around
+    the pixel, over both frequencies where there are eight samples, is the noise; left out are edges
+    that moved, outliers by the median of the magnitudes there.
 
     Parameters
     ----------
@@ -72,5 +76,9 @@ def opposite_samples_noise_lsb(raw: RawFrame) -> Tensor:
     padded = functional.pad(torch.stack(residuals, 1), (REACH_PX,) * 4, value=torch.nan)
     # [B, values around the pixel, H W]
     around = functional.unfold(padded, 2 * REACH_PX + 1)
-    median = around.nanmedian(1).values.view(raw.saturated.shape)
-    return (median / NORMAL_MEDIAN).clamp(min=LEAST_NOISE_LSB)
+    median = around.nanmedian(1, keepdim=True).values
+    limit = OUTLIER * (median / NORMAL_MEDIAN).clamp(min=LEAST_NOISE_LSB)
+    # A median of whole words comes in steps of half an LSB, so that it only tells what to leave.
+    kept = around.square().masked_fill(around > limit, torch.nan)
+    rms = (kept.nanmean(1) / KEPT_VARIANCE).sqrt().view(raw.saturated.shape)
+    return rms.clamp(min=LEAST_NOISE_LSB)
