@@ -15,7 +15,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import torch
-from figures import decoding, laser, light, sensor
+from figures import decoding, laser, light, sensor, stray_light
 from figures.stage import Made, Row
 
 DOCS = Path(__file__).parent
@@ -27,6 +27,7 @@ FIGURES: tuple[Callable[[], Made], ...] = (
     light.multipath,
     light.panes,
     light.motion,
+    stray_light.stray_light,
     sensor.photon_transfer,
     sensor.depth_noise,
     sensor.full_well,
