@@ -15,7 +15,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import torch
-from figures import decoding, laser, light, renderer, sensor
+from figures import decoding, laser, light, renderer, sensor, stray_light
 from figures.stage import Made, Row
 
 DOCS = Path(__file__).parent
@@ -29,6 +29,7 @@ FIGURES: tuple[Callable[[], Made], ...] = (
     light.panes,
     light.motion,
     renderer.renderer_error,
+    stray_light.stray_light,
     sensor.photon_transfer,
     sensor.depth_noise,
     sensor.full_well,

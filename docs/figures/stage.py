@@ -35,7 +35,10 @@ from unwrap.signal import (
 )
 from unwrap.signal.frequencies import SPEED_OF_LIGHT_M_S
 
-SENSOR = read_config(SensorConfig, find_config("sensor", "epc660"))
+# Without stray light, which would be in all that is rendered; it has a figure of its own.
+SENSOR = read_config(SensorConfig, find_config("sensor", "epc660")).model_copy(
+    update={"veiling_glare": 0.0, "ghost": 0.0}
+)
 LASER = read_config(LaserConfig, find_config("laser", "vcsel_detailed"))
 SINE = SENSOR.model_copy(update={"harmonic_strength": 0.0})
 """The sensor with sines for light and demodulation."""

@@ -285,7 +285,7 @@ def test_files_of_samples_tell_their_inputs_and_how_many_samples(fused, name):
     told = session.get_modelmeta().custom_metadata_map
     assert told["network"] == "toffusionnet" and told["shots"] == str(shots)
     assert told["every_row_and_column"] == ("2" if shots == 2 else "1")
-    assert float(told["min_snr"]) == 1.0 and ("quantised" in told) == ("int8" in name)
+    assert float(told["min_snr"]) == 3.0 and ("quantised" in told) == ("int8" in name)
 
 
 @pytest.mark.parametrize(
