@@ -45,8 +45,8 @@ GARAGE = """<scene version="3.0.0">
     <transform name="to_world"><scale x="0.6" y="0.1"/><rotate x="1" angle="180"/>
       <translate x="6" z="2.35"/></transform>
     <ref id="concrete"/>
-    <emitter type="area"><spectrum name="radiance" value="0.5"/></emitter></shape>
-  <emitter type="constant"><spectrum name="radiance" value="0.02"/></emitter>
+    <emitter type="area"><spectrum name="radiance" value="6.0"/></emitter></shape>
+  <emitter type="constant"><spectrum name="radiance" value="0.1"/></emitter>
 </scene>
 """
 
@@ -75,9 +75,9 @@ WORKSHOP_MATERIALS = """materials:
 
 WORKSHOP_PATH = """# GLB has y up and metres, by its standard; here are x ahead, y left, z up.
 lights:
-  sky: {zenith: 0.3, horizon: 0.3}
+  sky: {zenith: 0.05, horizon: 0.1}
   lamps:
-    - {position_m: [3, 0, 2.8], intensity_w_sr: 0.4, cutoff_deg: 80}
+    - {position_m: [3, 0, 2.8], intensity_w_sr: 3.0, cutoff_deg: 80}
 clips:
   - poses:
       - {time_s: 0.0, position_m: [0.0, 0.0, 0.8]}
