@@ -30,6 +30,8 @@ from shotenv.world.geometry import (
 )
 
 FORMATS = (".xml", ".ply", ".obj", ".stl", ".glb")
+FARTHEST_M = 1e6
+"""Of corners; beyond, a float32 tells no decimetres, and nothing is seen from afar anyway."""
 FLAT_SHARE = 0.9
 """Length of the sum of its faces' areas as vectors, over their sum, from which a lamp is flat."""
 Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
@@ -59,6 +61,8 @@ def own_world(scene: OwnScene, config: OwnSceneConfig, way: int, mount: MountCon
     return World(OWN, way, scene.static, (), scene.light, ego)
 
 
+# Corners that are infinite are refused in the end, by the name of their body.
+@np.errstate(invalid="ignore", over="ignore")
 def read_scene(config: OwnSceneConfig) -> OwnScene:
     """The scene in the file of `config`.
 
@@ -77,7 +81,6 @@ def read_scene(config: OwnSceneConfig) -> OwnScene:
         bodies = read_glb(path, config.most_faces)
     else:
         bodies = read_mesh(path, config.most_faces)
-    _check(path, bodies, config.most_faces)
     # glTF defines its axes; other formats leave them open.
     up = config.up or ("y" if suffix == ".glb" else "z")
     turn = Y_UP if up == "y" else np.eye(3)
@@ -86,6 +89,7 @@ def read_scene(config: OwnSceneConfig) -> OwnScene:
         for body in bodies
         if len(body.corners)
     ]
+    _check(path, placed, config.most_faces)
     surfaces = _surfaces(path, placed, config.materials)
     parts = [
         meshes.soup(body.corners, _material(surface))
@@ -107,11 +111,13 @@ def _check(path: Path, bodies: list[Body], most_faces: int) -> None:
         raise SceneFileError(f"{path} has no geometry; expected at least one triangle")
     check_count(path, faces, most_faces)
     for body in bodies:
-        broken = ~np.isfinite(body.corners.astype(np.float32)).all(axis=(1, 2))
+        # Not `> FARTHEST_M`, which is false for NaN.
+        broken = ~(np.abs(body.corners) <= FARTHEST_M).all(axis=(1, 2))
         if broken.any():
             raise SceneFileError(
                 f"{body.name} in {path} has {broken.sum()} faces with corners that are NaN or "
-                f"infinite, the first of them face {broken.argmax()}; expected numbers"
+                f"beyond {FARTHEST_M:g} m, the first of them face {broken.argmax()}; expected "
+                "numbers within that"
             )
 
 

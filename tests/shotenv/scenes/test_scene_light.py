@@ -141,8 +141,7 @@ def test_a_luminaire_lights_the_floor_as_its_size_and_radiance_say(tmp_path):
     """On its axis, E = pi L r^2 / (d^2 + r^2) for a disk of its area; and its face glows."""
     path = write_xml(
         tmp_path / "lamp.xml",
-        GREY
-        + '<shape type="rectangle"><transform name="to_world"><scale value="50"/></transform>'
+        GREY + '<shape type="rectangle"><transform name="to_world"><scale value="50"/></transform>'
         '<ref id="grey"/></shape>'
         '<shape type="disk"><transform name="to_world"><scale value="0.2"/>'
         '<rotate x="1" angle="180"/><translate z="3"/></transform><ref id="grey"/>'

@@ -10,7 +10,7 @@ import pytest
 from pydantic import ValidationError
 
 from shotenv.config.own_scene import OwnClip
-from shotenv.scenes.ways import motion_of, monotone_slopes
+from shotenv.scenes.ways import monotone_slopes, motion_of
 from shotenv.world.geometry.motion import ground_speed_m_s, yaw_rate_rad_s
 
 
