@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 
 from shotenv.config.own_scene import OwnSceneConfig, SurfaceConfig
-from shotenv.scenes.own_bank import NOT_READ
+from shotenv.scenes.bank_config import NOT_READ
 
 STRAIGHT = {"poses": [{"time_s": 0.0, "position_m": (0.0, 0.0, 1.0)},
                       {"time_s": 1.0, "position_m": (1.0, 0.0, 1.0)}]}  # fmt: skip

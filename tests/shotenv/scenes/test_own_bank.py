@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import runpy
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
+import yaml
 from render_worlds import square
 from scene_files import write_obj
 
@@ -21,8 +23,10 @@ from shotenv.bank.folders import bank_folder, identity
 from shotenv.bank.layout import BankError
 from shotenv.bank.opening import open_bank
 from shotenv.bank.store import verify
-from shotenv.config.bank import BankConfig
-from shotenv.scenes.own_bank import own_bank
+from shotenv.config.bank import BankConfig, WorldConfig
+from shotenv.config.own_scene import MaterialsConfig, ScenePathConfig
+from shotenv.scenes.bank_config import own_bank
+from unwrap.support.section import Section
 
 pytestmark = pytest.mark.render
 ROOT = Path(__file__).parents[3]
@@ -101,6 +105,22 @@ def test_it_has_a_contact_sheet_and_contents(bank, capsys):
     assert contact_sheet(bank, clips=2).size[0] > 100
     assert main(["bank", "info", str(bank.folder)]) == 0
     assert "two walls.obj at 10 Hz" in capsys.readouterr().out
+
+
+def test_the_page_s_files_are_read_as_they_stand():
+    page = (ROOT / "docs" / "scenes.md").read_text("utf-8")
+    models = {"clips": ScenePathConfig, "world": World, "materials": MaterialsConfig}
+    read = set()
+    for text in re.findall(r"^```yaml\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
+        content = yaml.safe_load(text)
+        (model,) = (model for key, model in models.items() if key in content)
+        model.model_validate(content)
+        read.add(model)
+    assert read == set(models.values())
+
+
+class World(Section):
+    world: WorldConfig
 
 
 def planned(folder: Path, sensor, wall_m: float = WALL_M) -> BankConfig:

@@ -21,8 +21,8 @@ from shotenv.config.bank import BankConfig, WorldConfig
 from shotenv.config.mounts import MountConfig
 from shotenv.config.reader import ConfigError
 from shotenv.render.mitsuba_file import SceneFileError, parse_mitsuba
-from shotenv.scenes.own_bank import own_bank
-from shotenv.scenes.own_world import read_scene
+from shotenv.scenes.bank_config import own_bank
+from shotenv.scenes.scene_worlds import read_scene
 
 pytestmark = pytest.mark.render
 DIFFUSE = '<bsdf type="diffuse"><spectrum name="reflectance" value="0.4"/></bsdf>'

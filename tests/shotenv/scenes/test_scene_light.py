@@ -23,7 +23,7 @@ from scene_files import scene_config, write_mesh, write_obj, write_xml
 from shotenv.config.mounts import MountConfig
 from shotenv.render.backend.llvm import start_mitsuba
 from shotenv.render.integrator import trace
-from shotenv.scenes.own_world import own_world, read_scene
+from shotenv.scenes.scene_worlds import own_world, read_scene
 
 pytestmark = pytest.mark.render
 WALL_M = 5.0
@@ -153,6 +153,24 @@ def test_a_luminaire_lights_the_floor_as_its_size_and_radiance_say(tmp_path):
     assert read.ambient[0][MIDDLE] == pytest.approx(expected, rel=2e-3)
     up = {"poses": [{"time_s": t, "position_m": (0, 0, 2.0), "pitch_deg": -89.9} for t in (0, 1)]}
     assert traced(path, clips=[up]).ambient[0].max() == pytest.approx(7.0, rel=0.02)
+
+
+def test_a_flat_lamp_has_a_lambertian_s_flux_and_nearly_its_directions():
+    from shotenv.render.light import spot_falloff
+
+    cosine = np.linspace(0.0, 1.0, 2001)
+    lamp = spot_falloff(mi_float(cosine), 0.0).numpy()
+    assert np.trapezoid(lamp, cosine) == pytest.approx(0.5, rel=1e-4)
+    near = cosine >= 0.5
+    assert (lamp[near] / cosine[near]).max() == pytest.approx(1.125, rel=1e-3)
+    assert (lamp[near] / cosine[near]).min() >= 1 - 1e-6
+    assert (lamp[~near] <= cosine[~near] + 1e-6).all()
+
+
+def mi_float(numbers):
+    import mitsuba as mi
+
+    return mi.Float(np.float32(numbers))
 
 
 def test_sun_sky_and_point_lamps_of_a_scene_are_those_of_a_world(tmp_path):

@@ -12,7 +12,7 @@ from shotenv.config import (
     ScenePathConfig,
     read_config,
 )
-from shotenv.scenes.own_world import OwnScene, own_world, read_scene
+from shotenv.scenes.scene_worlds import OwnScene, own_world, read_scene
 from shotenv.scenes.way_checks import check_way
 
 NOT_READ = "0" * 64
