@@ -144,6 +144,8 @@ def _part(state: Any, index: int, known: dict[int, Part | None]) -> Part:
             part.parts[name] = _part(state, value.index(), known)
         else:
             part.values[name] = _plain(properties.type(name).name, value)
+            if not _is_finite(part.values[name]):
+                raise SceneFileError(f"{name} of {part.title} is {value}; expected finite numbers")
     known[index] = part
     return part
 
@@ -162,3 +164,8 @@ def _plain(kind: str, value: Any) -> Any:
     if kind == "Spectrum" and len(value.values) == 1:
         return float(value.values[0])
     return None
+
+
+def _is_finite(value: Any) -> bool:
+    """Whether a plain value has no number that is NaN or infinite."""
+    return value is None or isinstance(value, str) or bool(np.isfinite(value).all())

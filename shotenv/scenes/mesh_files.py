@@ -124,6 +124,10 @@ def read_obj(path: Path, most_faces: int) -> list[Body]:
             try:
                 if words[:1] == ["v"]:
                     points.append([float(word) for word in words[1:4]])
+                    if len(points) > 3 * most_faces:
+                        raise SceneFileError(
+                            f"{path} has more vertices than 3 most_faces = {3 * most_faces}"
+                        )
                 elif words[:1] == ["usemtl"]:
                     material = " ".join(words[1:]) or NO_MATERIAL
                 elif words[:1] == ["f"]:

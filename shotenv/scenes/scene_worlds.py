@@ -96,7 +96,7 @@ def read_scene(config: OwnSceneConfig) -> OwnScene:
         for body, surface in zip(placed, surfaces, strict=True)
     ]
     glowing = [
-        _lamp_of(body.corners, surface.emission)
+        _lamp_of(body, surface.emission)
         for body, surface in zip(placed, surfaces, strict=True)
         if surface.emission > 0
     ]
@@ -152,15 +152,18 @@ def _material(surface: SurfaceConfig) -> Material:
     return Material(albedo_low=low, albedo_high=high, **rest)
 
 
-def _lamp_of(corners: np.ndarray, radiance: float) -> Lamp:
+def _lamp_of(body: Body, radiance: float) -> Lamp:
     """The lamp that lights other things as a glowing body does, seen from afar.
 
     Flat bodies shine from their front like a Lambertian disk of their area: as bright along their
     axis, at any distance, and with its flux. Others shine evenly to all sides.
     """
+    corners = body.corners
     area = meshes.area_vectors(corners) / 2
     each = np.linalg.norm(area, axis=1)
     whole, front = float(each.sum()), area.sum(axis=0)
+    if whole == 0:
+        raise SceneFileError(f"{body.name} glows, but its faces have no area")
     x, y, z = (float(n) for n in (corners.mean(axis=1) * each[:, None]).sum(axis=0) / whole)
     if np.linalg.norm(front) > FLAT_SHARE * whole:
         axis = front / np.linalg.norm(front)

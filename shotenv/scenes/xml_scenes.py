@@ -111,8 +111,9 @@ def _add_light(lights: FoundLights, emitter: Part) -> None:
 
 def _add_sun(lights: FoundLights, emitter: Part) -> None:
     turn = _to_world(emitter)
-    direction = np.array(emitter.values.get("direction", turn[:3, 2]))
-    x, y, z = (float(number) for number in direction)
+    x, y, z = (float(n) for n in emitter.values.get("direction", turn[:3, 2]))
+    if not (x or y or z):
+        raise SceneFileError(f"direction of {emitter.title} is (0, 0, 0); expected a vector")
     lights.suns.append((_number(emitter, "irradiance", 1.0), (x, y, z)))
 
 

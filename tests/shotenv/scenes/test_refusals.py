@@ -87,8 +87,15 @@ def test_a_hundred_million_faces_are_refused_by_the_header(tmp_path):
     assert "has 100000000 faces" in refusal(edited_glb(glb, promise))
 
 
+def test_points_without_end_are_refused(tmp_path):
+    path = tmp_path / "points.obj"
+    path.write_text("v 0 0 0\n" * 31)
+    assert "more vertices than 3 most_faces = 30" in refusal(path, most_faces=10)
+
+
 def test_the_limit_of_faces_is_the_configuration_s(tmp_path):
-    obj = write_obj(tmp_path / "wall.obj", np.concatenate([wall(5.0)] * 3))
+    obj = tmp_path / "fan.obj"
+    obj.write_text("v 5 0 0\nv 5 1 0\nv 5 1 1\n" + "f 1 2 3\n" * 6)
     assert "has 6 faces; expected at most most_faces = 5" in refusal(obj, most_faces=5)
     read_scene(scene_config(obj, most_faces=6))
     xml = write_xml(tmp_path / "two.xml", FLOOR * 2)
@@ -266,6 +273,19 @@ def test_surfaces_without_a_counterpart_are_refused_unless_the_table_has_them(
         ('<default name="x" value="y.xml"/><include filename="$x"/>', "without parameters"),
         ('<path value="/tmp"/>', "adds a search path"),
         ("<shape", "is no XML"),
+        (
+            '<shape type="sphere" id="s"><float name="radius" value="nan"/>' + DIFFUSE + "</shape>",
+            "radius of shape sphere 's' is nan; expected finite numbers",
+        ),
+        (
+            '<emitter type="directional"><vector name="direction" x="0" y="0" z="0"/></emitter>',
+            "direction of emitter directional is (0, 0, 0)",
+        ),
+        (
+            '<shape type="rectangle" id="r"><transform name="to_world"><scale value="0"/>'
+            "</transform>" + DIFFUSE + '<emitter type="area"/></shape>',
+            "shape rectangle 'r' glows, but its faces have no area",
+        ),
         ('<integrator type="path"/><volume type="gridvolume"/>', "volume gridvolume"),
     ],
 )  # fmt: skip
