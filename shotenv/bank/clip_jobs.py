@@ -34,9 +34,8 @@ class ClipJob:
 
 
 def clip_jobs(config: BankConfig, folder: Path) -> tuple[ClipJob, ...]:
-    """Clips of the bank in `folder`, in their order: split by split, the families in turn.
+    """Clips of the bank in `folder`, in the order of `BankConfig.clips`, the families in turn.
 
-    The held-out families come last, so that seeds of the others do not depend on `shift_clips`.
     In a scene of one's own they are the ways through it. Where a car has several cameras, each
     world or way is a clip of each.
     """
@@ -45,7 +44,7 @@ def clip_jobs(config: BankConfig, folder: Path) -> tuple[ClipJob, ...]:
     if own is None:
         kinds = [
             (split, family, world.frames_per_clip, None)
-            for split, (count, families) in config.clips.items()
+            for split, count, families in config.clips
             for _ in range(count)
             for family in families
         ]

@@ -1,6 +1,10 @@
 from .bank import BankConfig as BankConfig, CameraConfig as CameraConfig, WorldConfig as WorldConfig
 from .env import EnvConfig as EnvConfig, RewardConfig as RewardConfig
-from .families import Family as Family, Split as Split
+from .families import (
+    TRAINING_FAMILIES as TRAINING_FAMILIES,
+    Family as Family,
+    Split as Split,
+)
 from .keywords import env_config as env_config
 from .laser import ROOM_K as ROOM_K, LaserConfig as LaserConfig
 from .mounts import MountConfig as MountConfig

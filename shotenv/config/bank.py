@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from pydantic import Field, model_validator
 
-from shotenv.config.families import FAMILIES, SHIFT_FAMILIES, Family, Split
+from shotenv.config.families import (
+    FAMILIES,
+    SHIFT_FAMILIES,
+    TRAINING_FAMILIES,
+    Family,
+    Split,
+)
 from shotenv.config.mounts import MountConfig
 from shotenv.config.own_scene import OwnSceneConfig
 from shotenv.config.sensor import SensorConfig
-from unwrap.support import Positive, Range, Section, check_range
+from unwrap.support import NonNegative, Positive, Range, Section, check_range
 
 
 class CameraConfig(Section):
@@ -56,27 +62,36 @@ class BankConfig(Section):
     validation_clips: int = Field(3, ge=0, description="validation clips of each family")
     test_clips: int = Field(3, ge=0, description="test clips of each family")
     shift_clips: int = Field(0, ge=0, description="clips of each held-out family")
+    shift_mean_speed_m_s: NonNegative = Field(
+        0.3, description="mean ego speed over a clip of a held-out family is at least this, m/s"
+    )
+    clutter_clips: int = Field(
+        0, ge=0, description="further training clips, of the family for training only"
+    )
     own_scene: OwnSceneConfig | None = Field(
         None, description="scene of a file in place of drawn ones; `--scene` makes it"
     )
 
     @property
-    def clips(self) -> dict[Split, tuple[int, tuple[Family, ...]]]:
-        """Split to the number of clips of each of its families, and those families."""
+    def clips(self) -> tuple[tuple[Split, int, tuple[Family, ...]], ...]:
+        """Clips in their order: split, number of clips of each of its families, those families."""
         seen = self.world.families
-        return {
-            "train": (self.train_clips, seen),
-            "validation": (self.validation_clips, seen),
-            "test": (self.test_clips, seen),
-            "shift": (self.shift_clips, SHIFT_FAMILIES),
-        }
+        # Held-out clips come after those of the known families, and clutter last, so that numbers
+        # and seeds of what is judged on do not depend on what is added.
+        return (
+            ("train", self.train_clips, seen),
+            ("validation", self.validation_clips, seen),
+            ("test", self.test_clips, seen),
+            ("shift", self.shift_clips, SHIFT_FAMILIES),
+            ("train", self.clutter_clips, TRAINING_FAMILIES),
+        )
 
     @model_validator(mode="after")
     def _consistent(self) -> BankConfig:
-        if not any(count for count, _ in self.clips.values()):
+        if not any(count for _, count, _ in self.clips):
             raise ValueError(
-                "train_clips, validation_clips, test_clips and shift_clips are all 0; expected "
-                "at least one clip"
+                "train_clips, validation_clips, test_clips, shift_clips and clutter_clips are all "
+                "0; expected at least one clip"
             )
         # Clips of a family in two splits would let what is held out be learnt.
         held_out = sorted(set(self.world.families) & set(SHIFT_FAMILIES))
@@ -84,5 +99,17 @@ class BankConfig(Section):
             raise ValueError(
                 f"world.families has {', '.join(held_out)}, which shift_clips = "
                 f"{self.shift_clips} holds out; expected other families, or shift_clips = 0"
+            )
+        only_trained_on = sorted(set(self.world.families) & set(TRAINING_FAMILIES))
+        if only_trained_on:
+            raise ValueError(
+                f"world.families has {', '.join(only_trained_on)}, which is for training only; "
+                "expected other families, and clutter_clips for its clips"
+            )
+        fastest_m_s = self.world.speed_m_s[1]
+        if self.shift_clips and self.shift_mean_speed_m_s > fastest_m_s:
+            raise ValueError(
+                f"shift_mean_speed_m_s is {self.shift_mean_speed_m_s:g}; expected at most the "
+                f"upper end of world.speed_m_s, {fastest_m_s:g}"
             )
         return self

@@ -140,8 +140,7 @@ class Site:
 
 def footprints(mesh: Mesh, poses: list[Pose]) -> np.ndarray:
     """Ground rectangles [T, 2, 2] ((low, high), (x, y)) of what is below the headroom."""
-    points = mesh.corners.reshape(-1, 3).astype(np.float64)
-    points = points[points[:, 2] < HEADROOM_M, :2]
+    points = below(mesh.corners.astype(np.float64), HEADROOM_M)[:, :2]
     (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
     outline = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
     yaw = np.array([pose.yaw_rad for pose in poses])
@@ -149,6 +148,20 @@ def footprints(mesh: Mesh, poses: list[Pose]) -> np.ndarray:
     turn = np.moveaxis(np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]]), -1, 0)
     placed = outline @ turn + np.array([pose.position_m[:2] for pose in poses])[:, None]
     return np.stack([placed.min(axis=1), placed.max(axis=1)], axis=1)
+
+
+def below(corners: np.ndarray, height_m: float) -> np.ndarray:
+    """Points [N, 3] that span what is below a height of the triangles [F, 3, 3].
+
+    Their corners there, and where their edges cross the height: a slanting panel may have only one
+    corner below it.
+    """
+    start, end = corners.reshape(-1, 3), np.roll(corners, -1, axis=1).reshape(-1, 3)
+    low = start[:, 2] < height_m
+    crosses = low != (end[:, 2] < height_m)
+    start_z, end_z = start[crosses, 2:], end[crosses, 2:]
+    share = (height_m - start_z) / (end_z - start_z)
+    return np.concatenate([start[low], start[crosses] + share * (end[crosses] - start[crosses])])
 
 
 def overlap(a: np.ndarray, b: np.ndarray) -> bool:

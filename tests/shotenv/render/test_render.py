@@ -259,6 +259,7 @@ def test_jobs_come_back_with_their_results_from_replaced_workers():
     assert not multiprocessing.active_children()
 
 
+@pytest.mark.slow
 def test_workers_share_the_cores_with_torch_too():
     share = max(1, workers.available_cores() // 2)
     assert dict(run_jobs(torch_jobs.threads, [0], workers=2)) == {0: share}

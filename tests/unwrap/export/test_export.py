@@ -158,6 +158,7 @@ def test_onnx_equals_the_unwrapper_and_the_merge(written, tiny_unwrapper):
     assert found["wraps"].dtype == np.int32 and set(np.unique(found["wraps"])) >= {0, 1}
 
 
+@pytest.mark.slow
 def test_the_floor_merge_of_classes_is_equation_8(tmp_path, segmenting):
     path = tmp_path / "seg.onnx"
     assert export(segmenting, "--out", path, "--merge", "floor", "--check-bank", "none") == 0
