@@ -17,7 +17,7 @@ from agents.cli.command import (
     section_of,
     write_numbers,
 )
-from shotenv.config import BankConfig
+from shotenv.config import BankConfig, ConfigError
 from unwrap.support import progress, say, write_bytes
 
 
@@ -25,16 +25,28 @@ def render_arguments(parser: ArgumentParser) -> None:
     """What is rendered, where to, and by how many processes."""
     add_config(parser, BankConfig, "bank/starter.yaml")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the bank")
+    parser.add_argument(
+        "--scene", type=Path, metavar="FILE", help="render this scene (XML, PLY, OBJ, STL, GLB)"
+    )
+    parser.add_argument("--path", type=Path, metavar="FILE", help="ways through it, lights (YAML)")
+    parser.add_argument("--materials", type=Path, metavar="FILE", help="its surfaces (YAML)")
     parser.add_argument("--workers", type=PositiveInt, metavar="N", help="processes; one per core")
 
 
 def render_bank(arguments: Namespace) -> int:
-    """Render a bank."""
+    """Render a bank, of drawn worlds or of a scene of one's own."""
     # Here and below imports stand inside the commands: `shotenv --help` is to answer at once, and
     # torch alone takes seconds to load.
     from shotenv.bank import build_bank
 
     config = section_of(BankConfig, arguments)
+    scene, way, materials = arguments.scene, arguments.path, arguments.materials
+    if scene is not None and way is not None:
+        from shotenv.scenes import own_bank
+
+        config = own_bank(config, scene, way, materials)
+    elif any(given is not None for given in (scene, way, materials)):
+        raise ConfigError("--scene, --path and --materials: expected the first two, or none")
     folder = build_bank(config, arguments.out, workers=arguments.workers)
     print(f"The bank is in {folder}")
     return DONE

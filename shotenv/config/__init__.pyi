@@ -8,6 +8,16 @@ from .families import (
 )
 from .keywords import env_config as env_config
 from .laser import ROOM_K as ROOM_K, LaserConfig as LaserConfig
+from .mounts import MountConfig as MountConfig
+from .own_scene import (
+    OWN as OWN,
+    LightsConfig as LightsConfig,
+    MaterialsConfig as MaterialsConfig,
+    OwnClip as OwnClip,
+    OwnSceneConfig as OwnSceneConfig,
+    ScenePathConfig as ScenePathConfig,
+    SurfaceConfig as SurfaceConfig,
+)
 from .reader import (
     ConfigError as ConfigError,
     configs_dir as configs_dir,

@@ -14,6 +14,8 @@ from shotenv.config.families import (
     Family,
     Split,
 )
+from shotenv.config.mounts import MountConfig
+from shotenv.config.own_scene import OwnSceneConfig
 from shotenv.config.sensor import SensorConfig
 from unwrap.support import NonNegative, Positive, Range, Section, check_range
 
@@ -50,10 +52,16 @@ class WorldConfig(Section):
     speed_m_s: Range = Field((0.0, 15.0), description="ego speed, m/s")
     frame_rate_hz: Positive = Field(10.0, description="frames per second of a clip")
     frames_per_clip: int = Field(16, ge=1, le=4096, description="frames of one clip")
+    mounts: tuple[MountConfig, ...] = Field(
+        (MountConfig(),), min_length=1, description="sensor modules of the car, a clip for each"
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> WorldConfig:
         check_range("speed_m_s", self.speed_m_s)
+        names = [mount.name for mount in self.mounts]
+        if len(set(names)) < len(names):
+            raise ValueError(f"mounts are named {', '.join(names)}; expected each name once")
         return self
 
 
@@ -76,6 +84,9 @@ class BankConfig(Section):
     )
     clutter_clips: int = Field(
         0, ge=0, description="further training clips, of the family for training only"
+    )
+    own_scene: OwnSceneConfig | None = Field(
+        None, description="scene of a file in place of drawn ones; `--scene` makes it"
     )
 
     @property

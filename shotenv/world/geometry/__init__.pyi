@@ -16,5 +16,6 @@ from .motion import (
     rotation as rotation,
     yaw_rate_rad_s as yaw_rate_rad_s,
 )
+from .mounting import mounted as mounted
 from .site import Site as Site
 from .weather import draw_weather as draw_weather

@@ -7,6 +7,7 @@ band: irradiance W m-2, radiance W m-2 sr-1, radiant intensity W sr-1. No render
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -130,9 +131,12 @@ MAX_LAMPS = 16
 
 @dataclass(frozen=True)
 class World:
-    """Everything a clip of frames is rendered from; drawn from `seed` and `family` alone."""
+    """Everything a clip of frames is rendered from.
 
-    family: Family
+    Drawn from `seed` and `family` alone, or read from a file: the family is then "own".
+    """
+
+    family: Family | Literal["own"]
     seed: int
     static: Mesh
     moving: tuple[MovingObject, ...]

@@ -74,6 +74,7 @@ OTHER_WORLD = {
     "speed_m_s": (1.0, 2.0),
     "frame_rate_hz": 5.0,
     "frames_per_clip": 3,
+    "mounts": ({"position_m": (0.0, 0.5, 0.0)},),
 }
 OTHER_LASER = {
     "optical_power_w": (2.0, 3.0),
