@@ -97,7 +97,7 @@ def _trace_of(light: str, world: World, camera: CameraConfig) -> Callable[[int],
     """One image of laser or ambient light by the sensor's renderer, from a seed."""
     start_mitsuba()
     from shotenv.render.integrator import trace
-    from shotenv.render.scene import Surroundings
+    from shotenv.render.surfaces import Surroundings
 
     surroundings, laser = Surroundings(world), light == "laser"
     once = Instants((0.0,), (laser,), (not laser,), (0,), (0.0,), (0.0,))

@@ -124,7 +124,7 @@ def _error_over_time(panel) -> None:
     from shotenv.render.beam import emitted_sr
     from shotenv.render.instants import Instants
     from shotenv.render.integrator import trace
-    from shotenv.render.scene import Surroundings
+    from shotenv.render.surfaces import Surroundings
 
     scene = world(_room())
     surroundings = Surroundings(scene)

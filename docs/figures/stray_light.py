@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from figures.stage import BLUE, GREEN, PER_RADIAN_M, RED, SENSOR, Made, Row, axes, label, show
-from shotenv.config import find_config, merged, read_config
+from shotenv.config import find_config, read_config
+from shotenv.config.reader import merged
 from shotenv.config.sensor import SensorConfig
 from shotenv.render.lens import through_lens
 

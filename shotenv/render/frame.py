@@ -52,7 +52,7 @@ class FrameRenderer:
     def __init__(self, world: World, sensor: SensorConfig) -> None:
         start_mitsuba()
         # Not at the top: what only plans or reads banks starts without Mitsuba.
-        from shotenv.render.scene import Surroundings
+        from shotenv.render.surfaces import Surroundings
 
         self._world, self._sensor, self._surroundings = world, sensor, Surroundings(world)
         self._harmonics = harmonic_weights(sensor.harmonic_strength, sensor.highest_harmonic)

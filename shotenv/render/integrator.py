@@ -19,7 +19,6 @@ import mitsuba as mi
 import numpy as np
 
 from shotenv.config import CameraConfig
-from shotenv.render.geometry import REACH_M, posed
 from shotenv.render.instants import Instants
 from shotenv.render.laser_light import (
     POINTS,
@@ -33,7 +32,7 @@ from shotenv.render.light import PassiveLight
 from shotenv.render.modulation import FUNDAMENTAL, Harmonics, Modulation
 from shotenv.render.pinhole import Pinhole
 from shotenv.render.sampling import Lanes, Sampler
-from shotenv.render.scene import SURFACE_OFFSET_M, Hit, Scene, Surroundings
+from shotenv.render.surfaces import REACH_M, SURFACE_OFFSET_M, Hit, Scene, Surroundings, posed
 from shotenv.world.geometry import World
 
 VIEW_RAYS = 3

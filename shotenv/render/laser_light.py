@@ -15,11 +15,10 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from shotenv.render.geometry import REACH_M
 from shotenv.render.instants import Instants
 from shotenv.render.pinhole import Pinhole
 from shotenv.render.sampling import plane_sequence
-from shotenv.render.scene import SURFACE_OFFSET_M, Hit, Scene
+from shotenv.render.surfaces import REACH_M, SURFACE_OFFSET_M, Hit, Scene
 
 POINTS = 4096
 """Points that the laser shines on, at each instant: more than a hundred times those of a pixel."""

@@ -15,9 +15,8 @@ import mitsuba as mi
 import numpy as np
 
 from shotenv.render.backend import only_where, upload
-from shotenv.render.geometry import REACH_M
 from shotenv.render.instants import Instants
-from shotenv.render.scene import Hit, Scene
+from shotenv.render.surfaces import REACH_M, Hit, Scene
 from shotenv.world.geometry import MAX_LAMPS, Indoor, Lamp, World, rotation
 
 _LAMP_NUMBERS = 12

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from shotenv.render import SceneFileError
+from shotenv.render.surfaces import SceneFileError
 from shotenv.scenes.bodies import NO_MATERIAL, Body
 from shotenv.scenes.mesh_files import check_count
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from shotenv.render import SceneFileError
+from shotenv.render.surfaces import SceneFileError
 from shotenv.scenes.bodies import NO_MATERIAL, Body
 
 LONGEST_HEADER = 2**16

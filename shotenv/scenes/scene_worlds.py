@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from shotenv.config import OWN, LightsConfig, MountConfig, OwnSceneConfig, SurfaceConfig
-from shotenv.render import SceneFileError
+from shotenv.render.surfaces import SceneFileError
 from shotenv.scenes.bodies import Body, FoundLights
 from shotenv.scenes.glb_files import read_glb
 from shotenv.scenes.mesh_files import check_count, read_mesh

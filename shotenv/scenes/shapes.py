@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from shotenv.render import Part, SceneFileError
+from shotenv.render.surfaces import Part, SceneFileError
 
 TOLERANCE_M = 2.5e-4
 """How far a round body's triangles may lie within the round one: far below the 1 mm of a phase."""

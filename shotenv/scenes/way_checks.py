@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from shotenv.render import nearest_face
+from shotenv.render.surfaces import nearest_face
 from shotenv.world.geometry import Motion
 
 FASTEST_M_S = 60.0

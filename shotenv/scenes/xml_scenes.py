@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from shotenv.config import SurfaceConfig
-from shotenv.render import Part, SceneFileError, file_within, parse_mitsuba
+from shotenv.render.surfaces import Part, SceneFileError, file_within, parse_mitsuba
 from shotenv.scenes.bodies import NO_MATERIAL, Body, FoundLights
 from shotenv.scenes.mesh_files import check_count, read_mesh
 from shotenv.scenes.shapes import placed, triangles_of

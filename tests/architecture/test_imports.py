@@ -58,10 +58,22 @@ room(
 )
 room("shotenv.render.backend")
 room(
-    "shotenv.render", *SIGNAL, "shotenv.config", "shotenv.world.geometry", "shotenv.render.backend"
+    "shotenv.render.surfaces", "unwrap.support", "shotenv.world.geometry", "shotenv.render.backend"
 )
 room(
-    "shotenv.scenes", "unwrap.support", "shotenv.config", "shotenv.world.geometry", "shotenv.render"
+    "shotenv.render",
+    *SIGNAL,
+    "shotenv.config",
+    "shotenv.world.geometry",
+    "shotenv.render.backend",
+    "shotenv.render.surfaces",
+)
+room(
+    "shotenv.scenes",
+    "unwrap.support",
+    "shotenv.config",
+    "shotenv.world.geometry",
+    "shotenv.render.surfaces",
 )
 room("shotenv.sensor", *SIGNAL, "shotenv.config")
 room("shotenv.laser", "shotenv.config")

@@ -21,9 +21,9 @@ from shotenv.render.backend import llvm, workers
 from shotenv.render.backend.llvm import RendererError, find_llvm
 from shotenv.render.backend.workers import run_jobs
 from shotenv.render.frame import render_frame
-from shotenv.render.geometry import REACH_M, faces_of, posed, tile_grid
 from shotenv.render.instants import frame_instants
-from shotenv.render.texture import noise_texture
+from shotenv.render.surfaces.geometry import REACH_M, faces_of, posed, tile_grid
+from shotenv.render.surfaces.texture import noise_texture
 from shotenv.world.geometry.model import Lamp, Light, MovingObject
 from shotenv.world.geometry.motion import Arc, Pose, rotation
 from unwrap.signal.shots import sample_times_s

@@ -20,7 +20,7 @@ from scene_files import (
 from shotenv.config.bank import BankConfig, WorldConfig
 from shotenv.config.mounts import MountConfig
 from shotenv.config.reader import ConfigError
-from shotenv.render.mitsuba_file import SceneFileError, parse_mitsuba
+from shotenv.render.surfaces.mitsuba_file import SceneFileError, parse_mitsuba
 from shotenv.scenes.bank_config import own_bank
 from shotenv.scenes.scene_worlds import read_scene
 

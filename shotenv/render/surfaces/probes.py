@@ -37,7 +37,7 @@ def nearest_face(
     """
     mi = start_mitsuba()
     # Not at the top: it needs Mitsuba with its variant chosen.
-    from shotenv.render.scene import triangle_mesh
+    from shotenv.render.surfaces.scene import triangle_mesh
 
     scene = mi.load_dict({"type": "scene", "mesh": triangle_mesh(corners)})
     start = mi.Point3f(*_columns(mi, origins))

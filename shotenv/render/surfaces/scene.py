@@ -10,8 +10,8 @@ import mitsuba as mi
 import numpy as np
 
 from shotenv.render.backend import only_where, upload
-from shotenv.render.geometry import REACH_M, Posed, faces_of
-from shotenv.render.texture import noise_texture
+from shotenv.render.surfaces.geometry import REACH_M, Posed, faces_of
+from shotenv.render.surfaces.texture import noise_texture
 from shotenv.world.geometry import World
 
 SURFACE_OFFSET_M = 1e-3
