@@ -36,6 +36,7 @@ FIGURES: tuple[Callable[[], Made], ...] = (
     sensor.offsets,
     sensor.temperature,
     sensor.gray,
+    decoding.valid,
     decoding.dual,
     laser.laser_energy,
     laser.laser_curves,
