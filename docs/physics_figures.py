@@ -15,7 +15,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import torch
-from figures import decoding, laser, light, movers, sensor
+from figures import decoding, laser, light, movers, renderer, sensor, stray_light
 from figures.stage import Made, Row
 
 DOCS = Path(__file__).parent
@@ -25,15 +25,19 @@ FIGURES: tuple[Callable[[], Made], ...] = (
     light.signal,
     decoding.wiggle,
     light.multipath,
+    renderer.emission,
     light.panes,
     light.motion,
     movers.movers,
+    renderer.renderer_error,
+    stray_light.stray_light,
     sensor.photon_transfer,
     sensor.depth_noise,
     sensor.full_well,
     sensor.offsets,
     sensor.temperature,
     sensor.gray,
+    decoding.valid,
     decoding.dual,
     laser.laser_energy,
     laser.laser_curves,

@@ -6,7 +6,7 @@ import io
 from pathlib import Path
 
 from jsonargparse import ArgumentParser, Namespace
-from jsonargparse.typing import PositiveInt
+from jsonargparse.typing import PositiveFloat, PositiveInt
 
 from agents.cli.command import (
     DONE,
@@ -17,7 +17,7 @@ from agents.cli.command import (
     section_of,
     write_numbers,
 )
-from shotenv.config import BankConfig
+from shotenv.config import BankConfig, ConfigError
 from unwrap.support import progress, say, write_bytes
 
 
@@ -25,16 +25,28 @@ def render_arguments(parser: ArgumentParser) -> None:
     """What is rendered, where to, and by how many processes."""
     add_config(parser, BankConfig, "bank/starter.yaml")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the bank")
+    parser.add_argument(
+        "--scene", type=Path, metavar="FILE", help="render this scene (XML, PLY, OBJ, STL, GLB)"
+    )
+    parser.add_argument("--path", type=Path, metavar="FILE", help="ways through it, lights (YAML)")
+    parser.add_argument("--materials", type=Path, metavar="FILE", help="its surfaces (YAML)")
     parser.add_argument("--workers", type=PositiveInt, metavar="N", help="processes; one per core")
 
 
 def render_bank(arguments: Namespace) -> int:
-    """Render a bank."""
+    """Render a bank, of drawn worlds or of a scene of one's own."""
     # Here and below imports stand inside the commands: `shotenv --help` is to answer at once, and
     # torch alone takes seconds to load.
     from shotenv.bank import build_bank
 
     config = section_of(BankConfig, arguments)
+    scene, way, materials = arguments.scene, arguments.path, arguments.materials
+    if scene is not None and way is not None:
+        from shotenv.scenes import own_bank
+
+        config = own_bank(config, scene, way, materials)
+    elif any(given is not None for given in (scene, way, materials)):
+        raise ConfigError("--scene, --path and --materials: expected the first two, or none")
     folder = build_bank(config, arguments.out, workers=arguments.workers)
     print(f"The bank is in {folder}")
     return DONE
@@ -98,6 +110,42 @@ def verify_bank(arguments: Namespace) -> int:
     return FAILED if damaged else DONE
 
 
+def light_arguments(parser: ArgumentParser) -> None:
+    """Which bank and split, by which laser, and the network that reads its gray images."""
+    parser.add_argument("bank", nargs="?", default="starter", help="name or path of a bank")
+    parser.add_argument("--split", default="test", help="train, validation, test, all or shift")
+    parser.add_argument("--network", default="tofregnet", help="name or file of a gray network")
+    parser.add_argument("--laser_power_w", type=PositiveFloat, default=6.3, help="W while on")
+    parser.add_argument("--integration_s", type=PositiveFloat, default=6.4e-4, help="of a sample")
+    add_json(parser)
+
+
+def measure_light(arguments: Namespace) -> int:
+    """Tell what the light of a bank brings its sensor."""
+    from shotenv.bank import keep_predictions, open_bank
+    from shotenv.dataset import light_statistics, print_light
+    from unwrap.networks import load_unwrapper
+
+    bank = open_bank(arguments.bank)
+    if bank.config is None:
+        raise ValueError(f"{bank.folder} does not say what sensor it was made for")
+    kept = keep_predictions(bank, load_unwrapper(arguments.network))
+    clips = bank.splits(arguments.split)
+    with progress(sum(clip.frames for clip in clips), "measuring light", "frame") as bar:
+        found = light_statistics(
+            bank,
+            arguments.split,
+            bank.config.sensor,
+            laser_power_w=arguments.laser_power_w,
+            integration_s=arguments.integration_s,
+            kept=kept,
+            tick=bar.update,
+        )
+    print_light(found)
+    write_numbers(arguments, found)
+    return DONE
+
+
 COMMANDS = (
     Command(
         "render",
@@ -111,6 +159,12 @@ COMMANDS = (
         "list the banks, or tell and show what is in one",
         info_arguments,
         tell_about_banks,
+    ),
+    Command(
+        "bank light",
+        "signal, saturation and gray of a bank, and how long gray errors last",
+        light_arguments,
+        measure_light,
     ),
     Command(
         "bank verify",

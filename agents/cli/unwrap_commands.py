@@ -142,6 +142,7 @@ def correct_files(arguments: Namespace) -> int:
         told = f"{100 * frame['valid_share']:.1f} % valid, median {frame['median_m']:.3f} m"
         if frame["pixels_beyond_png"]:
             told += f", {frame['pixels_beyond_png']} beyond 65.535 m in the PNG"
+        told += f", noise {frame['noise_lsb']:.2f} LSB ({frame['noise_source']})"
         print(f"{frame['folder']}: {told}")
     write_numbers(arguments, found)
     return DONE

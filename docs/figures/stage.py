@@ -11,7 +11,14 @@ import torch
 from matplotlib.figure import Figure
 from torch import Tensor
 
-from shotenv.config import CameraConfig, LaserConfig, SensorConfig, find_config, read_config
+from shotenv.config import (
+    CameraConfig,
+    EmissionConfig,
+    LaserConfig,
+    SensorConfig,
+    find_config,
+    read_config,
+)
 from shotenv.render import RenderedFrame, render_frame
 from shotenv.sensor import Exposure, OffsetPattern, electrons_per_radiance_second, expose
 from shotenv.world.geometry import Arc, Light, Material, Mesh, Pose, World
@@ -28,12 +35,23 @@ from unwrap.signal import (
 )
 from unwrap.signal.frequencies import SPEED_OF_LIGHT_M_S
 
-SENSOR = read_config(SensorConfig, find_config("sensor", "epc660"))
+# Without stray light, which would be in all that is rendered; it has a figure of its own.
+SENSOR = read_config(SensorConfig, find_config("sensor", "epc660")).model_copy(
+    update={"veiling_glare": 0.0, "ghost": 0.0}
+)
 LASER = read_config(LaserConfig, find_config("laser", "vcsel_detailed"))
 SINE = SENSOR.model_copy(update={"harmonic_strength": 0.0})
 """The sensor with sines for light and demodulation."""
 POWER_W, INTEGRATION_S, ALBEDO = 7.0, 6e-4, 0.4  # assumed: ordinary ones of the drives
-CAMERA = CameraConfig(width=17, height=17, samples_per_pixel=1, gray_instants=1, bounces=1)
+CAMERA = CameraConfig(
+    width=17,
+    height=17,
+    samples_per_pixel=1,
+    gray_instants=1,
+    bounces=1,
+    # Even over the field of view and dark beyond: light of a closed form.
+    emission=EmissionConfig(edge_softness_deg=0.0),
+)
 MIDDLE = (8, 8)
 PER_RADIAN_M = unambiguous_range_m(SENSOR.f1_hz) / TWO_PI
 DARK = Light(0.0, (0.0, 0.0, 1.0), 0.0, 0.0, ())

@@ -15,7 +15,7 @@ from torch import Tensor
 
 from shotenv.bank.layout import ARRAYS, BankError, Manifest
 from shotenv.bank.store import read_manifest
-from shotenv.config import Split
+from shotenv.config import TRAINING_FAMILIES, Split
 from shotenv.sensor import Exposure
 from unwrap.training import RANDOM_SPLITS, random_split
 
@@ -152,15 +152,23 @@ class Bank:
         return self.manifest.fingerprint
 
     def splits(self, split: str) -> tuple[Clip, ...]:
-        """Clips of one split; "all" gives every clip but those of the shift split.
+        """Clips of one split; "all" gives those of the families that are trained *and* tested on.
+
+        "train" has those of the families for training only as well, where there are any.
 
         Raises
         ------
         BankError
             The bank has no clip in that split.
         """
-        wanted = RANDOM_SPLITS if split == "all" else (split,)
-        chosen = tuple(clip for clip in self.clips if clip.split in wanted)
+        if split == "all":
+            chosen = tuple(
+                clip
+                for clip in self.clips
+                if clip.split != "shift" and clip.family not in TRAINING_FAMILIES
+            )
+        else:
+            chosen = tuple(clip for clip in self.clips if clip.split == split)
         if not chosen:
             known = ", ".join(dict.fromkeys(clip.split for clip in self.clips))
             raise BankError(
@@ -177,8 +185,8 @@ class Bank:
         split : str
             As in `splits`.
         by : "clip" or "frame"
-            Those of whole clips; or the paper's random split, 80/10/10 of all frames but those of
-            the shift split, in which neighbouring frames come to lie on both sides.
+            Those of whole clips; or the paper's random split, 80/10/10 of the frames of "all", in
+            which neighbouring frames come to lie on both sides.
         seed : int
             Of the random split.
 

@@ -63,7 +63,7 @@ def build_bank(
         _claim(folder, config)
         # Only now, under the lock: another process may have rendered them meanwhile.
         missing = [job for job in jobs if read_clip_record(job.folder) is None]
-        _announce(config, folder, len(jobs), len(missing))
+        _announce(config, folder, len(jobs), missing)
         _render(missing, config, workers or available_cores())
         records = [read_clip_record(job.folder) for job in jobs]
         size = (config.camera.height, config.camera.width)
@@ -87,9 +87,9 @@ def _claim(folder: Path, config: BankConfig) -> None:
         leftover.unlink()
 
 
-def _announce(config: BankConfig, folder: Path, clips: int, missing: int) -> None:
+def _announce(config: BankConfig, folder: Path, clips: int, missing: Sequence[ClipJob]) -> None:
     """Say what is going to be rendered and how long it takes, or that the disk has no room."""
-    frames = missing * config.world.frames_per_clip
+    frames = sum(job.frames for job in missing)
     needed, free = bank_bytes(config, frames), shutil.disk_usage(folder).free
     if needed * DISK_MARGIN > free:
         raise BankError(
@@ -97,7 +97,7 @@ def _announce(config: BankConfig, folder: Path, clips: int, missing: int) -> Non
             "free; free space or choose another cache folder with SHOTENV_CACHE"
         )
     say(
-        f"Rendering bank '{config.name}' into {folder}: {missing} of {clips} clips, "
+        f"Rendering bank '{config.name}' into {folder}: {len(missing)} of {clips} clips, "
         f"{frames} frames, {needed / 1e6:.0f} MB, about {rendering_minutes(config, frames):.1f} "
         f"minutes on {available_cores()} cores. It can be interrupted; the next start continues.",
     )
@@ -110,12 +110,12 @@ def _render(jobs: Sequence[ClipJob], config: BankConfig, workers: int) -> None:
     # Worlds and renderer want packages that those who only open a bank need not have.
     from shotenv.bank.clip_rendering import render_clip
 
-    frames = config.world.frames_per_clip
-    with progress(len(jobs) * frames, "rendering", "frame") as bar:
+    longest = max(job.frames for job in jobs)
+    with progress(sum(job.frames for job in jobs), "rendering", "frame") as bar:
         # A clip of more frames than that still has to be one worker's.
-        jobs_per_worker = max(1, FRAMES_PER_WORKER // frames)
-        for _ in run_jobs(render_clip, jobs, workers=workers, jobs_per_worker=jobs_per_worker):
-            bar.update(frames)
+        jobs_per_worker = max(1, FRAMES_PER_WORKER // longest)
+        for job, _ in run_jobs(render_clip, jobs, workers=workers, jobs_per_worker=jobs_per_worker):
+            bar.update(job.frames)
 
 
 def bank_bytes(config: BankConfig, frames: int) -> int:

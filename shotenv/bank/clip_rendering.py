@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import torch
 
 from shotenv.bank.clip_jobs import ClipJob
-from shotenv.bank.layout import ARRAYS
+from shotenv.bank.layout import ARRAYS, BankError
 from shotenv.bank.store import write_clip
-from shotenv.config import BankConfig
+from shotenv.config import BankConfig, Family
 from shotenv.render import FrameRenderer, RenderedFrame
+from shotenv.scenes import own_world, read_scene
 from shotenv.sensor import capture_gray, gray_exposure_s
 from shotenv.world import draw_world
-from shotenv.world.geometry import World, ground_speed_m_s, yaw_rate_rad_s
+from shotenv.world.geometry import World, ground_speed_m_s, mounted, yaw_rate_rad_s
 
 METER_REDUCTION = 4
 """The light meter sees one pixel where the camera sees so many each way; assumed."""
@@ -20,12 +23,18 @@ METER_REDUCTION = 4
 GRAY_NOISE = -1
 """Number, among those of the frames, that seeds the noise of a clip's gray images."""
 
+MOST_WORLDS = 64
+"""Worlds that are drawn for a clip in which the ego has to move; about a fifth stand still."""
+
+SEEDS_APART = 2**32
+"""From the seed of one of them to the next: no other clip of any bank has seeds so far up."""
+
 
 def render_clip(job: ClipJob) -> str:
     """Render one clip and write it; returns its name."""
     config = job.config
-    world = draw_world(job.family, job.seed, config.world)
-    times = np.arange(config.world.frames_per_clip) / config.world.frame_rate_hz
+    world = world_of(job)
+    times = np.arange(job.frames) / config.world.frame_rate_hz
     rendered = _render_frames(world, times, config, job.seed)
     light = {
         name: np.stack([getattr(frame, name) for frame in rendered])
@@ -40,7 +49,7 @@ def render_clip(job: ClipJob) -> str:
     metadata = {
         "name": job.name,
         "family": job.family,
-        "seed": job.seed,
+        "seed": world.seed,
         "split": job.split,
         "time_s": times.tolist(),
         "ego_speed_m_s": [ground_speed_m_s(world.ego, time) for time in times],
@@ -49,6 +58,58 @@ def render_clip(job: ClipJob) -> str:
     }
     write_clip(job.folder, {**light, "gray": gray.numpy().astype(np.uint16)}, metadata)
     return job.name
+
+
+def world_of(job: ClipJob) -> World:
+    """The world of a clip, drawn or read from its file, seen by the clip's camera.
+
+    Raises
+    ------
+    BankError
+        The scene's file, or another that belongs to it, is no longer what the bank is of; or no
+        world drawn is as `drawn_world` wants it.
+    """
+    if job.family != "own":
+        drawn = drawn_world(job.family, job)
+        return replace(drawn, ego=mounted(drawn.ego, job.mount))
+    own, way = job.config.own_scene, job.way
+    if own is None or way is None:
+        raise BankError(f"clip {job.name} has no scene; expected own_scene in its configuration")
+    scene = read_scene(own)
+    if scene.digest != own.digest:
+        raise BankError(
+            f"{own.file} has changed since the bank was begun; `shotenv render --scene` begins "
+            "one of what it is now"
+        )
+    return own_world(scene, own, way, job.mount)
+
+
+def drawn_world(family: Family, job: ClipJob) -> World:
+    """The world of a clip's seed, or in the shift split the first with a moving ego.
+
+    Raises
+    ------
+    BankError
+        No world drawn has an ego as fast as `shift_mean_speed_m_s`.
+    """
+    config = job.config
+    least_m_s = config.shift_mean_speed_m_s if job.split == "shift" else 0.0
+    for attempt in range(MOST_WORLDS):
+        world = draw_world(family, job.seed + attempt * SEEDS_APART, config.world)
+        if mean_speed_m_s(world, config) >= least_m_s:
+            return world
+    raise BankError(
+        f"shift_mean_speed_m_s is {least_m_s:g}, but in {MOST_WORLDS} worlds of {family} the "
+        "ego was slower; expected a speed that is usual there"
+    )
+
+
+def mean_speed_m_s(world: World, config: BankConfig) -> float:
+    """Length of the ego's way over a clip by the clip's duration, m/s."""
+    # From instant to instant: who drives to and fro, or stops half way, has moved all the same.
+    times = np.arange(config.world.frames_per_clip + 1) / config.world.frame_rate_hz
+    way = np.array([world.ego.at(float(time)).position_m[:2] for time in times])
+    return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum() / times[-1])
 
 
 def _render_frames(

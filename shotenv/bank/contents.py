@@ -92,9 +92,11 @@ def _settings(config: dict[str, Any] | None) -> str:
     if config is None:
         return "no, imported"
     camera, world, sensor = config["camera"], config["world"], config["sensor"]
+    own = config["own_scene"]
+    clips = f"ways in {own['file']}" if own else f"{world['frames_per_clip']} frames per clip"
     return (
         f"{camera['samples_per_pixel']} rays per pixel and instant, {camera['bounces']} bounces, "
-        f"{camera['horizontal_fov_deg']:g} degrees; {world['frames_per_clip']} frames per clip at "
+        f"{camera['horizontal_fov_deg']:g} degrees; {clips} at "
         f"{world['frame_rate_hz']:g} Hz; {sensor['name']}, {sensor['f1_hz'] / 1e6:g} and "
         f"{sensor['f2_hz'] / 1e6:g} MHz; seeds from {config['seed']}"
     )

@@ -37,8 +37,12 @@ def bank_folder(config: BankConfig) -> Path:
 
 
 def identity(config: BankConfig) -> dict[str, Any]:
-    """Everything that the bank's content depends on, as JSON: all but `ACQUISITION_FIELDS`."""
-    content = config.model_dump(mode="json", exclude={"sensor": set(ACQUISITION_FIELDS)})
+    """Everything that the bank's content depends on, as JSON: all but `ACQUISITION_FIELDS`.
+
+    A scene of one's own counts by the digest of what is in its files, wherever they lie.
+    """
+    unrelated = {"sensor": set(ACQUISITION_FIELDS), "own_scene": {"file", "most_faces"}}
+    content = config.model_dump(mode="json", exclude=unrelated)
     return {"rendering_version": RENDERING_VERSION, "config": content}
 
 

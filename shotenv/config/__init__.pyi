@@ -4,10 +4,25 @@ from .bank import (
     CameraConfig as CameraConfig,
     WorldConfig as WorldConfig,
 )
+from .emission import EmissionConfig as EmissionConfig
 from .env import EnvConfig as EnvConfig, RewardConfig as RewardConfig
-from .families import Family as Family, Split as Split
+from .families import (
+    TRAINING_FAMILIES as TRAINING_FAMILIES,
+    Family as Family,
+    Split as Split,
+)
 from .keywords import env_config as env_config
 from .laser import ROOM_K as ROOM_K, LaserConfig as LaserConfig
+from .mounts import MountConfig as MountConfig
+from .own_scene import (
+    OWN as OWN,
+    LightsConfig as LightsConfig,
+    MaterialsConfig as MaterialsConfig,
+    OwnClip as OwnClip,
+    OwnSceneConfig as OwnSceneConfig,
+    ScenePathConfig as ScenePathConfig,
+    SurfaceConfig as SurfaceConfig,
+)
 from .reader import (
     ConfigError as ConfigError,
     configs_dir as configs_dir,

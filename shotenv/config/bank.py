@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+import math
+
 from pydantic import Field, model_validator
 
-from shotenv.config.families import FAMILIES, SHIFT_FAMILIES, Family, Split
+from shotenv.config.emission import EmissionConfig
+from shotenv.config.families import (
+    FAMILIES,
+    SHIFT_FAMILIES,
+    TRAINING_FAMILIES,
+    Family,
+    Split,
+)
+from shotenv.config.mounts import MountConfig
+from shotenv.config.own_scene import OwnSceneConfig
 from shotenv.config.sensor import SensorConfig
-from unwrap.support import Positive, Range, Section, check_range
+from unwrap.support import NonNegative, Positive, Range, Section, check_range
 
 HIGHEST_SPEED_M_S = 60.0
 """Of the ego: faster than any car that a sensor of 25 m would be put on."""
 
 
 class CameraConfig(Section):
-    """Image geometry and the instants that are rendered."""
+    """Image geometry, the laser beside the lens, and the instants that are rendered."""
 
     width: int = Field(160, ge=16, le=1280, description="pixels across")
     height: int = Field(120, ge=16, le=960, description="pixels down")
@@ -21,6 +32,20 @@ class CameraConfig(Section):
     samples_per_pixel: int = Field(4, ge=1, description="camera rays per pixel and instant")
     gray_instants: int = Field(4, ge=1, le=16, description="instants that make the gray image")
     bounces: int = Field(2, ge=1, le=8, description="surface hits of a light path")
+    emission: EmissionConfig = EmissionConfig()
+
+    @property
+    def half_extents(self) -> tuple[float, float]:
+        """Tangents of half the horizontal and half the vertical field of view; square pixels."""
+        across = math.tan(math.radians(self.horizontal_fov_deg) / 2)
+        return across, across * self.height / self.width
+
+    @model_validator(mode="after")
+    def _emission_covers_the_view(self) -> CameraConfig:
+        across, down = self.half_extents
+        wider = math.degrees(math.atan(max(across, down)))
+        self.emission.check_covers(wider, math.degrees(math.atan(math.hypot(across, down))))
+        return self
 
 
 class WorldConfig(Section):
@@ -32,6 +57,9 @@ class WorldConfig(Section):
     )
     frame_rate_hz: Positive = Field(10.0, description="frames per second of a clip")
     frames_per_clip: int = Field(16, ge=1, le=4096, description="frames of one clip")
+    mounts: tuple[MountConfig, ...] = Field(
+        (MountConfig(),), min_length=1, description="sensor modules of the car, a clip for each"
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> WorldConfig:
@@ -41,6 +69,9 @@ class WorldConfig(Section):
             raise ValueError(
                 f"speed_m_s is ({low:g}, {high:g}); expected speeds from 0 to {HIGHEST_SPEED_M_S:g}"
             )
+        names = [mount.name for mount in self.mounts]
+        if len(set(names)) < len(names):
+            raise ValueError(f"mounts are named {', '.join(names)}; expected each name once")
         return self
 
 
@@ -58,24 +89,36 @@ class BankConfig(Section):
     validation_clips: int = Field(3, ge=0, description="validation clips of each family")
     test_clips: int = Field(3, ge=0, description="test clips of each family")
     shift_clips: int = Field(0, ge=0, description="clips of each held-out family")
+    shift_mean_speed_m_s: NonNegative = Field(
+        0.3, description="mean ego speed over a clip of a held-out family is at least this, m/s"
+    )
+    clutter_clips: int = Field(
+        0, ge=0, description="further training clips, of the family for training only"
+    )
+    own_scene: OwnSceneConfig | None = Field(
+        None, description="scene of a file in place of drawn ones; `--scene` makes it"
+    )
 
     @property
-    def clips(self) -> dict[Split, tuple[int, tuple[Family, ...]]]:
-        """Split to the number of clips of each of its families, and those families."""
+    def clips(self) -> tuple[tuple[Split, int, tuple[Family, ...]], ...]:
+        """Clips in their order: split, number of clips of each of its families, those families."""
         seen = self.world.families
-        return {
-            "train": (self.train_clips, seen),
-            "validation": (self.validation_clips, seen),
-            "test": (self.test_clips, seen),
-            "shift": (self.shift_clips, SHIFT_FAMILIES),
-        }
+        # Held-out clips come after those of the known families, and clutter last, so that numbers
+        # and seeds of what is judged on do not depend on what is added.
+        return (
+            ("train", self.train_clips, seen),
+            ("validation", self.validation_clips, seen),
+            ("test", self.test_clips, seen),
+            ("shift", self.shift_clips, SHIFT_FAMILIES),
+            ("train", self.clutter_clips, TRAINING_FAMILIES),
+        )
 
     @model_validator(mode="after")
     def _consistent(self) -> BankConfig:
-        if not any(count for count, _ in self.clips.values()):
+        if not any(count for _, count, _ in self.clips):
             raise ValueError(
-                "train_clips, validation_clips, test_clips and shift_clips are all 0; expected "
-                "at least one clip"
+                "train_clips, validation_clips, test_clips, shift_clips and clutter_clips are all "
+                "0; expected at least one clip"
             )
         # Clips of a family in two splits would let what is held out be learnt.
         held_out = sorted(set(self.world.families) & set(SHIFT_FAMILIES))
@@ -83,5 +126,17 @@ class BankConfig(Section):
             raise ValueError(
                 f"world.families has {', '.join(held_out)}, which shift_clips = "
                 f"{self.shift_clips} holds out; expected other families, or shift_clips = 0"
+            )
+        only_trained_on = sorted(set(self.world.families) & set(TRAINING_FAMILIES))
+        if only_trained_on:
+            raise ValueError(
+                f"world.families has {', '.join(only_trained_on)}, which is for training only; "
+                "expected other families, and clutter_clips for its clips"
+            )
+        fastest_m_s = self.world.speed_m_s[1]
+        if self.shift_clips and self.shift_mean_speed_m_s > fastest_m_s:
+            raise ValueError(
+                f"shift_mean_speed_m_s is {self.shift_mean_speed_m_s:g}; expected at most the "
+                f"upper end of world.speed_m_s, {fastest_m_s:g}"
             )
         return self

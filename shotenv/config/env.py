@@ -33,6 +33,9 @@ class EnvConfig(Section):
     split: Literal[Split, "all"] = Field(
         "train", description="clips that drives are made of; all: those of no held-out family"
     )
+    clutter: bool = Field(
+        False, description="whether train drives also pass the clips for training networks only"
+    )
     unwrapper: str = Field("tofregnet", description="name or path of an unwrapping network")
     # The words of `unwrap.depth.Merge`, which would bring torch along; a test compares them.
     merge: Literal["nearest", "floor", "none"] = Field(

@@ -17,6 +17,7 @@ Family = Literal[
     "construction_site",
     "forest_path",
     "snowy_street",
+    "clutter",
 ]
 
 FAMILIES: tuple[Family, ...] = ("sunny_road", "overcast_street", "garage", "tunnel", "night_road")
@@ -29,3 +30,6 @@ SHIFT_FAMILIES: tuple[Family, ...] = (
     "snowy_street",
 )
 """Held out: other geometry, materials and light, and kinds of things that FAMILIES never show."""
+
+TRAINING_FAMILIES: tuple[Family, ...] = ("clutter",)
+"""For networks to learn from: in the train split alone, and not in drives unless asked for."""

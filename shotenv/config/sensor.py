@@ -75,6 +75,18 @@ class SensorConfig(Section):
     wavelength_nm: float = Field(940.0, ge=300.0, le=2000.0, description="laser wavelength, nm")
     f_number: float = Field(1.2, ge=0.5, le=32.0, description="lens f-number")
     lens_transmission: Share = Field(0.8, description="lens and filter transmission")
+    veiling_glare: Fraction = Field(
+        0.0, description="share of all light that the lens spreads over the image"
+    )
+    veiling_glare_width: Share = Field(
+        0.25, description="standard deviation of that spread, in widths of the image"
+    )
+    ghost: Fraction = Field(
+        0.0, description="share of all light that is mirrored through the image's centre"
+    )
+    ghost_width: Fraction = Field(
+        0.02, description="blur of the ghost: standard deviation in widths of the image"
+    )
     pixel_pitch_m: float = Field(20e-6, ge=1e-6, le=1e-3, description="pixel pitch, m")
     fill_factor: Share = Field(1.0, description="light-sensitive share of a pixel")
     quantum_efficiency: Share = Field(0.28, description="electrons per photon in band")
@@ -96,7 +108,9 @@ class SensorConfig(Section):
     )
     gray_max_exposure_s: Positive = Field(5e-3, description="longest gray exposure, s")
     gray_target: Share = Field(0.3, description="mean of full scale aimed at by gray exposure")
-    min_snr: NonNegative = Field(1.0, description="signal-to-noise below which depth is invalid")
+    min_snr: NonNegative = Field(
+        3.0, description="decoded amplitude over a sample's noise below which depth is invalid"
+    )
     saturation_range_m: Positive = Field(
         6.2, description="d_sat of eq. 6 and 8: wrapped distances from here on are not trusted, m"
     )
@@ -105,6 +119,11 @@ class SensorConfig(Section):
     @model_validator(mode="after")
     def _consistent(self) -> SensorConfig:
         check_range("integration_s", self.integration_s)
+        if self.veiling_glare + self.ghost > 1.0:
+            raise ValueError(
+                f"veiling_glare is {self.veiling_glare:g} and ghost {self.ghost:g}: more than all "
+                "light; expected a sum of at most 1"
+            )
         if self.f2_hz >= self.f1_hz:
             raise ValueError(f"f2_hz is {self.f2_hz:g}; expected less than f1_hz = {self.f1_hz:g}")
         if self.highest_harmonic % 2 == 0:

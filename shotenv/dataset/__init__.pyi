@@ -7,4 +7,5 @@ from .export_inputs import (
     choose_check_bank as choose_check_bank,
 )
 from .sensed_frames import SensedFrames as SensedFrames
+from .signal_statistics import light_statistics as light_statistics, print_light as print_light
 from .source import sources as sources

@@ -61,7 +61,7 @@ def _clip_scores(problem: Problem, clip: Clip) -> list[Scores]:
                 one.scored,
                 problem.description,
                 offset_lsb=drive.offsets.calibrated_lsb,
-                noise_lsb=one.noise_lsb,
+                noise_lsb={shots: acquisition.noise_lsb for shots, acquisition in made.items()},
                 shift_m=drive.drift_m,
             )
         )

@@ -181,7 +181,13 @@ class SensedFrames:
                 offsets=drive.offsets,
             ),
             offset_lsb=drive.offsets.calibrated_lsb,
-            noise_lsb=sample_noise_lsb(words, exposure_s, drive.integration_s, sensor),
+            noise_lsb=sample_noise_lsb(
+                words,
+                exposure_s,
+                drive.integration_s,
+                sensor,
+                offset_left_lsb=drive.offset_left_lsb if shots == Shots.TWO else None,
+            ),
             shift_m=drive.drift_m,
         )
 

@@ -81,9 +81,13 @@ def acquire_depth(
         light = incident_light(exposure, sensitivity(sensor, power_w, drive.integration_s))
     scored = scored_pixels(undiminished, exposure.distance_m, sensor)
     raw = acquire(light, sensor, shots=shots, noise=noise, offsets=drive.offsets)
-    # As the sensor itself expects it, from its gray image: the same for any number of samples.
+    # As the sensor itself expects it, from its gray image and, of two samples, its calibration.
     noise_lsb = sample_noise_lsb(
-        gray, problem.gray_exposure_s.take(frames), drive.integration_s, sensor
+        gray,
+        problem.gray_exposure_s.take(frames),
+        drive.integration_s,
+        sensor,
+        offset_left_lsb=drive.offset_left_lsb if shots == Shots.TWO else None,
     )
     predicted_m = predict(problem, drive, frames, raw, noise_lsb)
     depth = correct(

@@ -17,6 +17,7 @@ from shotenv.sensor import (
     Sensitivity,
     draw_offsets,
     imager_temperature_k,
+    offset_left_lsb,
     residual_drift_m,
     sensitivity,
     stream,
@@ -46,6 +47,8 @@ class Drive:
         Electrons per light with this power and time.
     offsets : OffsetPattern
         Fixed pattern of the imager, [B, H, W].
+    offset_left_lsb : float64 [B]
+        Standard deviation of what the stored map of the offsets leaves, as the sensor expects it.
     drift_m : float64 [B]
         What the imager's temperature adds to every distance, compensation included, metres.
     always_eight : ShotCost
@@ -61,6 +64,7 @@ class Drive:
     start_k: Tensor
     sensitivity: Sensitivity
     offsets: OffsetPattern
+    offset_left_lsb: Tensor
     drift_m: Tensor
     always_eight: ShotCost
 
@@ -115,6 +119,7 @@ def draw_drive(
         start_k=ambient_k + unit[3:4] * (config.laser.release_k - ambient_k),
         sensitivity=sensitivity(config.sensor, laser_power_w, integration_s),
         offsets=offsets,
+        offset_left_lsb=offset_left_lsb(config.sensor, imager_k),
         drift_m=residual_drift_m(config.sensor, imager_k),
         # The most there is: the reward's terms must not leave 0..1 however warm the laser is.
         always_eight=shot_cost(

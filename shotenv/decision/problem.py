@@ -8,8 +8,16 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
-from shotenv.bank import Bank, Clip, KeptPredictions, check_fits, keep_predictions, open_bank
-from shotenv.config import EnvConfig
+from shotenv.bank import (
+    Bank,
+    BankError,
+    Clip,
+    KeptPredictions,
+    check_fits,
+    keep_predictions,
+    open_bank,
+)
+from shotenv.config import TRAINING_FAMILIES, EnvConfig
 from shotenv.decision.scenes import Scenes, look_at_scenes
 from shotenv.laser import NetworkWork
 from shotenv.sensor import description_of
@@ -35,7 +43,7 @@ class Problem:
     config : EnvConfig
     bank : Bank
     clips : tuple of Clip
-        Those of the chosen split.
+        Those of the chosen split; of the families for training only where `clutter` asks for it.
     kept : KeptPredictions
         Predictions from the gray image of each of the bank's frames: the chosen network's, or
         `GRAY_NETWORK`'s where that one needs samples.
@@ -89,7 +97,7 @@ def open_problem(config: EnvConfig) -> Problem:
     gray, fusion = load_networks(config.unwrapper, description)
     bank = open_bank(config.bank)
     check_fits(bank, config.sensor, frame_rate_hz=config.frame_rate_hz)
-    clips = bank.splits(config.split)
+    clips = clips_driven(bank, config)
     kept = keep_predictions(bank, gray)
     size = bank.height, bank.width
     return Problem(
@@ -105,6 +113,27 @@ def open_problem(config: EnvConfig) -> Problem:
         ),
         description=description,
     )
+
+
+def clips_driven(bank: Bank, config: EnvConfig) -> tuple[Clip, ...]:
+    """Clips of the chosen split that drives pass.
+
+    Raises
+    ------
+    BankError
+        The bank has no clip in that split, or only those of families for training networks.
+    """
+    clips = bank.splits(config.split)
+    if config.clutter:
+        return clips
+    # Schedulers are trained on drives like those that they are tested on.
+    driven = tuple(clip for clip in clips if clip.family not in TRAINING_FAMILIES)
+    if not driven:
+        raise BankError(
+            f"bank {bank.folder} has clips of {', '.join(TRAINING_FAMILIES)} alone in split "
+            f"{config.split!r}, which drives leave out; set clutter to true, or choose another bank"
+        )
+    return driven
 
 
 def load_networks(

@@ -10,6 +10,7 @@ import numpy as np
 from shotenv.config import CameraConfig, SensorConfig
 from shotenv.render.backend import start_mitsuba
 from shotenv.render.instants import frame_instants
+from shotenv.render.lens import through_lens
 from unwrap.signal import harmonic_weights
 
 if TYPE_CHECKING:  # Worker processes start without loading how worlds are drawn.
@@ -51,7 +52,7 @@ class FrameRenderer:
     def __init__(self, world: World, sensor: SensorConfig) -> None:
         start_mitsuba()
         # Not at the top: what only plans or reads banks starts without Mitsuba.
-        from shotenv.render.scene import Surroundings
+        from shotenv.render.surfaces import Surroundings
 
         self._world, self._sensor, self._surroundings = world, sensor, Surroundings(world)
         self._harmonics = harmonic_weights(sensor.harmonic_strength, sensor.highest_harmonic)
@@ -81,10 +82,11 @@ class FrameRenderer:
             surroundings=self._surroundings,
         )
         laser, passive = np.array(instants.laser), np.array(instants.passive)
+        # The lens is linear: means over instants pass through it as each instant would.
         return RenderedFrame(
-            correlation=traced.correlation[laser],
-            active=traced.active[laser].mean(axis=0),
-            ambient=traced.ambient[passive].mean(axis=0),
+            correlation=through_lens(traced.correlation[laser], self._sensor),
+            active=through_lens(traced.active[laser].mean(axis=0), self._sensor),
+            ambient=through_lens(traced.ambient[passive].mean(axis=0), self._sensor),
             # Of the first sample, the instant that the frame is asked for.
             distance_m=traced.distance_m[0],
         )

@@ -2,7 +2,8 @@
 
 Light paths start at the camera. At a surface they go on diffusely, mirrored, or straight through,
 by chance in proportion to the surface's shares; sun, sky and lamps are added at each surface, and
-so is the laser: by the way that the camera looks, back through all mirrors and panes, and directly.
+so is the laser: by the way that the camera looks, back through all mirrors and panes, directly, and
+by the points that it shines on.
 What a mirror throws on a surface that is seen directly (a caustic) is left out.
 """
 
@@ -18,17 +19,27 @@ import mitsuba as mi
 import numpy as np
 
 from shotenv.config import CameraConfig
-from shotenv.render.geometry import REACH_M, posed
 from shotenv.render.instants import Instants
+from shotenv.render.laser_light import (
+    POINTS,
+    POINTS_PER_PATH,
+    LitPoints,
+    along_view,
+    density_by_scattering,
+    straight,
+)
 from shotenv.render.light import PassiveLight
 from shotenv.render.modulation import FUNDAMENTAL, Harmonics, Modulation
 from shotenv.render.pinhole import Pinhole
 from shotenv.render.sampling import Lanes, Sampler
-from shotenv.render.scene import SURFACE_OFFSET_M, Hit, Scene, Surroundings
+from shotenv.render.surfaces import REACH_M, SURFACE_OFFSET_M, Hit, Scene, Surroundings, posed
 from shotenv.world.geometry import World
 
-_RETRO_COS = 0.5
-"""Cosine of the steepest incidence at which surfaces retro-reflect: 60 degrees, assumed."""
+VIEW_RAYS = 3
+"""Rays of each path through its pixel for the laser's direct return: it is most of its light, and
+where an edge crosses a pixel, its share of the pixel decides the distance."""
+SKY_RAYS = 3
+"""Rays of each path to the sky from the first surface that is seen."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +78,8 @@ def trace(
 ) -> Traced:
     """Trace `camera.samples_per_pixel` paths per pixel and instant, in one kernel launch.
 
-    The laser sits at the camera and shines evenly over the field of view. `harmonics` are those
-    of the correlation, see `unwrap.signal.harmonic_weights`; `surroundings` are those of the
+    The laser sits at the camera and shines as `camera.emission` says. `harmonics` are those of
+    the correlation, see `unwrap.signal.harmonic_weights`; `surroundings` are those of the
     same world, where frames of it have been traced before. The result depends on the arguments
     alone, bit for bit on one machine.
     """
@@ -84,8 +95,9 @@ def trace(
     surroundings = Surroundings(world) if surroundings is None else surroundings
     scene = Scene(surroundings, posed(world, surroundings.faces, instants.times_s, camera.bounces))
     sampler = Sampler(lanes, instants, camera, seed=seed)
-    gathered = _follow(scene, sources, lanes, camera.bounces, sampler)
-    return _collect(gathered, len(instants), camera)
+    points = LitPoints.shone_on(scene, eye, instants, seed) if camera.bounces > 1 else None
+    gathered = _follow(scene, sources, points, lanes, camera.bounces, sampler)
+    return _collect(gathered, _true_distance(scene, eye, len(instants), camera), camera)
 
 
 @dataclass(frozen=True)
@@ -104,7 +116,6 @@ class _Gathered:
     """What the lanes have gathered so far."""
 
     modulation: Modulation
-    distance_m: Any
     ambient: Any
     active: Any
     correlation: Any
@@ -151,35 +162,50 @@ class _Onward:
         )
 
 
-LEAST_CHANCE, MOST_CHANCE = 0.5, 0.75
-"""Chance, at least and at most, of going on mirrored or straight through where a surface does so
-besides scattering: what a wet road mirrors is bright and sharp, what it scatters dim and smooth, so
-that chances in proportion to the shares would leave the first to luck."""
-
-
 def _chances(hit: Hit):
-    """Chances of going on mirrored, straight through, and diffusely; their sum is 1."""
-    straight = hit.mirror + hit.clear
-    mixed = dr.clip(straight, LEAST_CHANCE, MOST_CHANCE)
-    chance = dr.select(straight > 0, dr.select(hit.diffuse > 0, mixed, 1), 0)
-    scale = dr.select(straight > 0, chance / straight, 0)
-    return hit.mirror * scale, hit.clear * scale, 1 - chance
+    """Chances of going on mirrored, straight through, and diffusely; their sum is 1.
+
+    Whole quarters, so that of four samples always as many go each way. Half of them or more go on
+    mirrored or straight through where a surface does so besides scattering: what a wet road
+    mirrors is bright and sharp, what it scatters dim and smooth, so that chances in proportion to
+    the shares would leave the first to luck.
+    """
+    mirrors, clears, scatters = hit.mirror > 0, hit.clear > 0, hit.diffuse > 0
+    both = mirrors & clears
+    most = both | (hit.mirror + hit.clear > hit.diffuse)
+    straight = dr.select(scatters, dr.select(most, 0.75, 0.5), 1)
+    straight = dr.select(mirrors | clears, straight, 0)
+    lesser = dr.select(both, 0.25, 0)
+    mirror = dr.select(mirrors & (~clears | (hit.mirror > hit.clear)), straight - lesser, lesser)
+    return mirror, straight - mirror, 1 - straight
 
 
 def _follow(
-    scene: Scene, sources: _Sources, lanes: Lanes, bounces: int, sampler: Sampler
+    scene: Scene,
+    sources: _Sources,
+    points: LitPoints | None,
+    lanes: Lanes,
+    bounces: int,
+    sampler: Sampler,
 ) -> _Gathered:
-    """Walk every lane's path from the camera, adding the light of each surface hit."""
+    """Walk every lane's path from the camera, adding the light of each surface hit.
+
+    `points` are needed where paths have more than one surface.
+    """
     passive, instant = sources.passive, lanes.instant
-    origin, direction = sources.eye.rays(lanes, sampler.next_2d())
+    eye = sources.eye
+    place, *further = sampler.in_pixel(VIEW_RAYS)
+    origin, direction = eye.rays(lanes, place)
+    intensity, share = eye.intensity(direction, instant), 1 / (1 + len(further))
     hit = scene.hit(origin, direction, instant, mi.Bool(True), coherent=True)
     light = _Gathered(
         modulation=sources.modulation,
-        distance_m=dr.select(hit.valid, hit.distance_m, dr.inf),
         ambient=dr.select(sources.passive_on & ~hit.valid, passive.sky(direction), 0),
         active=mi.Float(0),
         correlation=mi.Float(0),
     )
+    for place in further:
+        _add_first_return(light, scene, sources, lanes, place, share)
     throughput, walked_m = mi.Float(1), hit.distance_m
     # Share of the laser's light on the way that the camera looks; 0 once that way has scattered.
     # `bent`: a mirror or a diffuse surface lies behind, so that the laser shines on the next one
@@ -191,17 +217,23 @@ def _follow(
     # A Python loop: each bounce is traced into the one kernel, which knows the first and the last.
     for bounce in range(bounces):
         laser_on, passive_on = hit.valid & sources.laser_on, hit.valid & sources.passive_on
-        returned = _laser_along_view(sources.eye, hit, direction, walked_m)
+        returned = along_view(hit, intensity, direction, walked_m)
         returned = dr.select(laser_on, throughput * way_back * returned, 0)
+        if bounce == 0:
+            returned *= share
         light.add_active(returned, 2 * walked_m)
         if bounce > 0:
             lit = laser_on & bent
-            radiance, leg_m = _laser_straight(scene, sources.eye, hit, instant, lit, found)
+            radiance, leg_m = straight(scene, eye, hit, instant, lit, found)
             light.add_active(throughput * radiance, walked_m + leg_m)
-        if bounce + 1 < bounces:
-            point = sampler.next_2d()
-            radiance, way_m = _laser_by_emission(scene, sources.eye, hit, instant, point, laser_on)
-            light.add_active(throughput * radiance, walked_m + way_m)
+        if points is not None and bounce + 1 < bounces:
+            chosen = sampler.next_block(POINTS_PER_PATH, POINTS), sampler.next_1d()
+            *_, diffuse = _chances(hit)
+            active, correlation = points.light(
+                scene, eye, hit, diffuse, walked_m, instant, light.modulation, chosen, laser_on
+            )
+            light.active += dr.select(laser_on, throughput * active, 0)
+            light.correlation += dr.select(laser_on, throughput * correlation, 0)
         # Faces of lamps glow for the camera and its mirrors alone: what they shine on others is
         # the `Lamp`'s, and would be counted twice.
         glow = dr.select(passive_on & (way_back > 0), hit.emission, 0)
@@ -211,13 +243,21 @@ def _follow(
         aim, which = sampler.next_2d(), sampler.next_1d()
         number, sample = sampler.next_choice(), sampler.next_2d()
         onward = _Onward.drawn(hit, direction, number, sample)
+        if bounce == 0:
+            aimed = ~passive.sky_is_aimed_at(hit)
+            sky = passive.sky_irradiance(
+                scene, hit, instant, sampler.next_points(SKY_RAYS), passive_on & aimed
+            )
+            light.ambient += sky * hit.diffuse * hit.albedo * dr.inv_pi
         numbers = aim, which, onward.number
         irradiance = passive.irradiance(scene, hit, instant, numbers, passive_on)
         # The surface reflects to the camera whatever way the path goes on.
         light.ambient += throughput * irradiance * hit.diffuse * hit.albedo * dr.inv_pi
         throughput *= onward.kept
         seeks_sky = passive_on & dr.select(
-            onward.scatters, ~passive.sky_is_aimed_at(hit), seeks_sky | ~onward.passes
+            onward.scatters,
+            ~passive.sky_is_aimed_at(hit) & (bounce > 0),
+            seeks_sky | ~onward.passes,
         )
         direction = onward.direction
         if bounce + 1 < bounces:
@@ -227,7 +267,8 @@ def _follow(
             )
             previous, hit = hit, scene.hit(onward.start, direction, instant, hit.valid)
             walked_m += dr.norm(hit.point - previous.point)
-            density = _density_by_scattering(previous, hit.point, hit.normal)
+            *_, diffuse = _chances(previous)
+            density = density_by_scattering(previous, diffuse, hit.point, hit.normal)
             found = dr.select(onward.scatters, density, dr.inf)
             free = dr.select(seeks_sky & ~hit.valid, 1, 0)
         else:
@@ -238,91 +279,39 @@ def _follow(
     return light
 
 
-def _density_by_scattering(hit: Hit, point, normal):
-    """Density, per area of a surface at `point`, of scattering from `hit` to that point, m-2."""
-    way = point - hit.point
-    # Points of one corner may lie on each other.
-    square = dr.maximum(dr.squared_norm(way), 1e-8)
-    direction = way * dr.rsqrt(square)
-    leaving = dr.maximum(dr.dot(hit.normal, direction), 0)
-    arriving = dr.maximum(-dr.dot(normal, direction), 0)
-    *_, diffuse = _chances(hit)
-    return diffuse * dr.inv_pi * leaving * arriving / square
+def _add_first_return(
+    light: _Gathered, scene: Scene, sources: _Sources, lanes: Lanes, place, share: float
+) -> None:
+    """Add a share of what the surface on another ray of the pixel returns of the laser directly."""
+    eye, instant = sources.eye, lanes.instant
+    origin, direction = eye.rays(lanes, place)
+    hit = scene.hit(origin, direction, instant, sources.laser_on, coherent=True)
+    returned = along_view(hit, eye.intensity(direction, instant), direction, hit.distance_m)
+    light.add_active(dr.select(hit.valid, returned, 0) * share, 2 * hit.distance_m)
 
 
-def _laser_along_view(eye: Pinhole, hit: Hit, direction, distance_m):
-    """Radiance per watt of the laser's light that came the way that the camera looks.
-
-    Mirrors fold that way and panes dim it, but nothing else can stand on it. Surfaces that it
-    meets steeply enough retro-reflect.
-    """
-    cosine = -dr.dot(hit.normal, direction)
-    retro = dr.select(cosine > _RETRO_COS, hit.retro, 0)
-    return _reflected(hit, eye.intensity, cosine, distance_m) * (1 + retro)
+def _true_distance(scene: Scene, eye: Pinhole, instants: int, camera: CameraConfig):
+    """Distance through the centres of all pixels at all instants; the same for every seed."""
+    lanes = Lanes.of(instants, camera.model_copy(update={"samples_per_pixel": 1}))
+    origin, direction = eye.rays(lanes, mi.Point2f(0.5, 0.5))
+    return scene.distance_m(origin, direction, lanes.instant)
 
 
-def _laser_straight(scene: Scene, eye: Pinhole, hit: Hit, instant, active, found):
-    """Radiance per watt of the laser's light that came straight, and its distance.
-
-    `found` is the density, per area, of having found the surface by scattering, infinite where no
-    other way leads there. Where the laser could have found it by its own emission, both ways are
-    weighted by their densities (balance heuristic, Veach and Guibas 1995).
-    """
-    intensity, direction, distance = eye.laser(hit.point, instant)
-    cosine = dr.maximum(dr.dot(hit.normal, direction), 0)
-    radiance = _reflected(hit, intensity, cosine, distance)
-    lit = active & (radiance > 0)
-    length = distance - SURFACE_OFFSET_M
-    share = scene.transmission(hit.leave, direction, length, instant, lit)
-    emitted = eye.emission_density(direction, instant) * cosine / dr.square(distance)
-    # Emission stops at the first surface, so that behind a pane it finds nothing.
-    weight = dr.select((share == 1) & (found < dr.inf), found / (found + emitted), 1)
-    return dr.select(lit, radiance * share * weight, 0), dr.minimum(distance, REACH_M)
-
-
-def _laser_by_emission(scene: Scene, eye: Pinhole, hit: Hit, instant, sample, active):
-    """Radiance per watt of the surface `hit` in the light of a point that the laser shines on.
-
-    And the length of the way from the laser over that point. The other half of `_laser_straight`:
-    surfaces near the laser, which scattering finds by rare luck, are found here by plenty.
-    """
-    origin, direction, per_sr = eye.emitted(sample, instant)
-    lit = scene.hit(origin, direction, instant, active)
-    way = lit.leave - hit.leave
-    length = dr.norm(way)
-    toward = way / length
-    cosine = dr.maximum(-dr.dot(lit.normal, direction), 0)
-    emitted = per_sr * cosine / dr.square(lit.distance_m)
-    found = _density_by_scattering(hit, lit.point, lit.normal)
-    *_, diffuse = _chances(hit)
-    radiance = _reflected(lit, eye.intensity, cosine, lit.distance_m)
-    # Scattering keeps hit.diffuse * hit.albedo per density / chance.
-    radiance *= hit.diffuse * hit.albedo * found / (diffuse * (found + emitted))
-    seen = active & lit.valid & (radiance > 0)
-    share = scene.transmission(hit.leave, toward, length - SURFACE_OFFSET_M, instant, seen)
-    return dr.select(seen & (share == 1), radiance, 0), lit.distance_m + length
-
-
-def _reflected(hit: Hit, intensity, cosine, distance_m):
-    """Radiance that a surface reflects diffusely of a point source."""
-    return hit.diffuse * hit.albedo * dr.inv_pi * intensity * cosine / dr.square(distance_m)
-
-
-def _collect(light: _Gathered, instants: int, camera: CameraConfig) -> Traced:
-    """Mean over the samples of each pixel; distances are those of sample 0, through its centre."""
+def _collect(light: _Gathered, distance_m: Any, camera: CameraConfig) -> Traced:
+    """Mean over the samples of each pixel."""
     samples = camera.samples_per_pixel
-    first = dr.arange(mi.UInt32, instants * camera.width * camera.height) * samples
+    first = dr.arange(mi.UInt32, len(distance_m)) * samples
     # The launch; the sums read other lanes, and so make a second, small kernel.
-    dr.eval(light.distance_m, light.ambient, light.active, light.correlation)
+    dr.eval(distance_m, light.ambient, light.active, light.correlation)
     images = [
-        dr.gather(mi.Float, light.distance_m, first),
+        distance_m,
         *(
             _sum(values, first, samples) / samples
             for values in (light.ambient, light.active, light.correlation)
         ),
     ]
     dr.eval(images)
-    shape = (instants, camera.height, camera.width)
+    shape = (-1, camera.height, camera.width)
     return Traced(*(image.numpy().reshape(shape) for image in images))
 
 

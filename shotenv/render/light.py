@@ -16,9 +16,8 @@ import mitsuba as mi
 import numpy as np
 
 from shotenv.render.backend import only_where, upload
-from shotenv.render.geometry import REACH_M
 from shotenv.render.instants import Instants
-from shotenv.render.scene import Hit, Scene
+from shotenv.render.surfaces import REACH_M, Hit, Scene
 from shotenv.world.geometry import MAX_LAMPS, Indoor, Lamp, World, rotation
 
 _LAMP_NUMBERS = 12
@@ -93,6 +92,15 @@ class PassiveLight:
                 + self.lamps(scene, hit, instant, lamp, active)
             ),
         )
+
+    def sky_irradiance(self, scene: Scene, hit: Hit, instant, points, active):
+        """Estimate of the sky's irradiance on a surface, W m-2, by a ray for each of `points`."""
+        frame, total = mi.Frame3f(hit.normal), mi.Float(0)
+        for point in points:
+            direction = frame.to_world(mi.warp.square_to_cosine_hemisphere(point))
+            free = scene.transmission(hit.leave, direction, mi.Float(REACH_M), instant, active)
+            total += self.sky(direction) * free
+        return total * (dr.pi / len(points))
 
     def daylight(self, scene: Scene, hit: Hit, instant, aim, number, active):
         """Irradiance of the sun on a surface, with its shadow, W m-2; deep indoors also the sky's.

@@ -54,6 +54,35 @@ class Sampler:
         # XOR with a number below the next power of two shuffles and keeps the sequence's blocks.
         self._shuffle_mask = (1 << (count - 1).bit_length()) - 1
 
+    def in_pixel(self, count: int) -> list[Any]:
+        """`count` points of its pixel for each lane; a lone sample has its centre only.
+
+        Points of one quarter, turned by right angles about the centre for neighbouring samples:
+        each is anywhere with the same chance, and all that is linear over the pixel cancels in
+        the mean of four (of two: opposite ones), such as the distance of a slanted road.
+        """
+        if self._samples == 1:
+            return [mi.Point2f(0.5, 0.5)]
+        turn, shift = self._rng.next_uint32(), [self._rng.next_float32() for _ in _STEP_2D]
+        # Opposite ones first, so that two samples cancel as well.
+        quarter = (self._sample ^ turn) % 4
+        swap, flip = quarter >= 2, (quarter % 2) == 1
+        points = []
+        for number in range(count):
+            order = mi.Float(self._index // 4 * count + number)
+            x, y = (
+                0.5 * _wrap(order * step + start)
+                for step, start in zip(_STEP_2D, shift, strict=True)
+            )
+            x, y = dr.select(swap, -y, x), dr.select(swap, x, y)
+            points.append(mi.Point2f([0.5 + dr.select(flip, -side, side) for side in (x, y)]))
+        return points
+
+    def next_block(self, size: int, count: int):
+        """First of `size` neighbours in a sequence of `count`; a pixel's samples take turns."""
+        first = mi.UInt32(self._rng.next_float32() * count)
+        return (first + self._sample * size) % count
+
     def next_1d(self):
         """A number in [0, 1)."""
         return _wrap(self._order() * _STEP_1D + self._rng.next_float32())
@@ -61,17 +90,36 @@ class Sampler:
     def next_choice(self):
         """A number in [0, 1), one in each n-th part of it for the n samples of a pixel.
 
-        For choices: of two that are as likely each is then taken by half of the samples.
+        For choices: of two that are as likely each is then taken by half of the samples, by ones
+        that lie opposite in the pixel.
         """
-        turned = (
-            self._sample + mi.UInt32(self._rng.next_float32() * self._samples)
-        ) % self._samples
-        return (mi.Float(turned) + self._rng.next_float32()) * (1 / self._samples)
+        place, draw = self._turned_sample(), mi.Float(self._index // self._samples)
+        within = _wrap(draw * _STEP_1D + self._rng.next_float32())
+        return (mi.Float(place) + within) * (1 / self._samples)
+
+    def _turned_sample(self):
+        """The sample's number, permuted at random; 2 i and 2 i + 1 stay neighbours if it can be."""
+        count = self._samples
+        turn = mi.UInt32(self._rng.next_float32() * count)
+        return self._sample ^ turn if count & (count - 1) == 0 else (self._sample + turn) % count
 
     def next_2d(self):
         """A point of the unit square."""
         order = self._order()
         return mi.Point2f([_wrap(order * step + self._rng.next_float32()) for step in _STEP_2D])
+
+    def next_points(self, count: int) -> list[Any]:
+        """`count` points of the unit square; those of a pixel's samples are one sequence."""
+        shift = [self._rng.next_float32() for _ in _STEP_2D]
+        return [
+            mi.Point2f(
+                [
+                    _wrap(mi.Float(self._index * count + number) * step + start)
+                    for step, start in zip(_STEP_2D, shift, strict=True)
+                ]
+            )
+            for number in range(count)
+        ]
 
     def _order(self):
         return mi.Float(self._index ^ (self._rng.next_uint32() & self._shuffle_mask))
@@ -79,3 +127,12 @@ class Sampler:
 
 def _wrap(value):
     return value - dr.floor(value)
+
+
+def plane_sequence(count: int, seed: int) -> np.ndarray:
+    """Points [count, 2] of the unit square that cover it evenly, shifted at random by `seed`.
+
+    So do any neighbours among them.
+    """
+    shift = np.random.default_rng(seed).random(2)
+    return (np.arange(count)[:, None] * _STEP_2D + shift) % 1.0

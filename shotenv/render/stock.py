@@ -12,9 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from shotenv.config import CameraConfig
-from shotenv.render.geometry import faces_of, posed
-from shotenv.render.scene import triangle_mesh
-from shotenv.render.texture import noise_texture
+from shotenv.render.surfaces import faces_of, noise_texture, posed, triangle_mesh
 from shotenv.world.geometry import Light, Pose, World, rotation
 
 _NEAR_CLIP_M = 1e-5

@@ -26,4 +26,8 @@ from .noise import (
     stream as stream,
     stream_seed as stream_seed,
 )
-from .offsets import OffsetPattern as OffsetPattern, draw_offsets as draw_offsets
+from .offsets import (
+    OffsetPattern as OffsetPattern,
+    draw_offsets as draw_offsets,
+    offset_left_lsb as offset_left_lsb,
+)

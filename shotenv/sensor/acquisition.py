@@ -106,6 +106,7 @@ def acquire(
         offsets = OffsetPattern(torch.zeros(shape), torch.zeros(shape))
         pixel = pixel._replace(ambient_lsb_per_e=np.float32(0))
     if noise is None:
+        pixel = pixel._replace(shot_noise=np.float32(0))
         noise = repeat(torch.zeros(batch, 2, height, width))
     dcs_lsb = np.empty((batch, int(shots), height, width), np.float32)
     saturated = np.zeros(shape, np.bool_)

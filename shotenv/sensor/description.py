@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 from shotenv.config import SensorConfig
+from shotenv.sensor.gray import dark_variance_lsb2
 from unwrap.signal import (
     SensorDescription,
     WiggleTable,
@@ -30,6 +33,7 @@ def description_of(sensor: SensorConfig) -> SensorDescription:
         f2_hz=sensor.f2_hz,
         max_range_m=sensor.max_range_m,
         saturation_range_m=sensor.saturation_range_m,
+        noise_lsb=math.sqrt(dark_variance_lsb2(sensor)),
         min_snr=sensor.min_snr,
         max_residual_m=TRUSTED_SPACING * spacing_m,
         wiggle=stored_wiggle(sensor),

@@ -58,3 +58,16 @@ def draw_offsets(
     drift.mul_(sensor.offset_drift_lsb_per_k * warmer_k)
     # The map holds a share of every pixel's value, so that what it misses has the same pattern.
     return OffsetPattern(pattern + drift, sensor.offset_calibrated_share * pattern)
+
+
+def offset_left_lsb(sensor: SensorConfig, imager_k: Tensor) -> Tensor:
+    """Standard deviation of what the stored map leaves, of the shape of `imager_k`, LSB.
+
+    As the sensor can expect it from its calibration and its thermometer; what ambient light adds
+    is not in it.
+    """
+    unknown_lsb = (1.0 - sensor.offset_calibrated_share) * sensor.offset_std_lsb
+    warmer_k = imager_k - sensor.calibration_temperature_k
+    return torch.hypot(
+        torch.full_like(imager_k, unknown_lsb), sensor.offset_drift_lsb_per_k * warmer_k
+    )

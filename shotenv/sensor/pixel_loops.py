@@ -7,6 +7,7 @@ constants too: one Python float would make the arithmetic float64 (see `unwrap.s
 
 from __future__ import annotations
 
+from math import erfc
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,10 @@ import numpy as np
 from unwrap.support import inlined, loop
 
 Array = np.ndarray
-HALF, ZERO = np.float32(0.5), np.float32(0.0)
+ZERO, HALF, ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)
+ROOT_HALF, ROOT_TWO_PI = np.float32(np.sqrt(0.5)), np.float32(np.sqrt(2 * np.pi))
+FAR, TINY_E = np.float32(6.0), np.float32(1e-3)
+"""Standard deviations from the full well at which a charge no longer feels it."""
 
 
 class IncidentLight(NamedTuple):
@@ -53,6 +57,8 @@ class Pixel(NamedTuple):
         Offset that ambient light adds, of opposite sign in even and odd rows.
     low_lsb, high_lsb
         Samples of the lowest and the highest word.
+    shot_noise
+        1, or 0 where a full well is to clip a charge that does not fluctuate.
     """
 
     contrast: np.float32
@@ -62,6 +68,7 @@ class Pixel(NamedTuple):
     ambient_lsb_per_e: np.float32
     low_lsb: np.float32
     high_lsb: np.float32
+    shot_noise: np.float32 = ONE
 
 
 @inlined
@@ -82,6 +89,30 @@ def noisy_e(packet_e, normal):
     in step whatever the light is.
     """
     return packet_e + normal * np.sqrt(packet_e)
+
+
+@inlined
+def clipped_e(charge_e, normal, pixel):
+    """A tap near its full well as it is read, by one standard normal; see `packet_e`.
+
+    A charge of mean q and variance q is cut off at the full well, then read. Mean and variance of
+    the cut normal distribution have closed forms in d, the distance from q to the full well in
+    standard deviations s, with its density p and distribution P there: the mean loses
+    s (p - d (1 - P)), the variance becomes s^2 ((1 + d^2) P + d p - (p + d P)^2).
+    """
+    # Not 0, which would make 0 / 0 of a charge that just fills the tap.
+    deviation_e = max(pixel.shot_noise * np.sqrt(charge_e), TINY_E)
+    d = min(max((pixel.full_well_e - charge_e) / deviation_e, -FAR), FAR)
+    density = np.float32(np.exp(-HALF * d * d)) / ROOT_TWO_PI
+    # `erfc` and not 1 - P, which would be lost in rounding.
+    above = HALF * np.float32(erfc(d * ROOT_HALF))
+    below = HALF * np.float32(erfc(-d * ROOT_HALF))
+    short = density + d * below
+    spread = max((ONE + d * d) * below + d * density - short * short, ZERO)
+    # Beyond `FAR` nothing is lost, or all that the full well does not hold.
+    lost_e = max(deviation_e * (density - d * above), charge_e - pixel.full_well_e)
+    variance_e = deviation_e * deviation_e * spread + pixel.read_variance_e
+    return charge_e - lost_e + pixel.read_variance_e + normal * np.sqrt(variance_e)
 
 
 @inlined
@@ -108,7 +139,8 @@ def take_sample_(
 ) -> None:
     """Sample `number` of B frames: taps, noise, full well, difference, converter.
 
-    The taps hold `(S + B +- m C) / 2`. Read noise may take a tap below zero.
+    The taps hold `(S + B +- m C) / 2`. Read noise may take a tap below zero. A full well cuts off
+    the fluctuations of the charge, but not the noise of reading it.
 
     Parameters
     ----------
@@ -126,6 +158,10 @@ def take_sample_(
     # Packets carry the variance of reading them; it cancels in the difference of two taps, and
     # the full well is raised by as much.
     full_e = pixel.full_well_e + pixel.read_variance_e
+    # Charges up to here do not feel the full well; those above are found by their noisy packets,
+    # which lie no lower than `near_e`.
+    reach_e = FAR * np.sqrt(pixel.full_well_e)
+    free_e, near_e = pixel.full_well_e - reach_e, full_e - reach_e - reach_e
     frames, rows, columns = saturated.shape
     for b in range(frames):
         active_e, ambient_e = light.active_e[b], light.ambient_e[b]
@@ -137,18 +173,18 @@ def take_sample_(
             correlation, pattern = light.correlation[b, number, i], pattern_lsb[b, i]
             normal_a, normal_b = normals[b, 0, i], normals[b, 1, i]
             words, full = dcs_lsb[b, number, i], saturated[b, i]
+            near = False
             for j in range(columns):
                 background_e = ambient[j] * ambient_e
                 mean_e = HALF * (active[j] * active_e + background_e)
                 half_e = correlation[j] * swing_e
                 a_e = noisy_e(packet_e(mean_e + half_e, pixel.read_variance_e), normal_a[j])
                 b_e = noisy_e(packet_e(mean_e - half_e, pixel.read_variance_e), normal_b[j])
-                held_e = min(a_e, full_e) - min(b_e, full_e)
                 offset_lsb = pattern[j] + ambient_offset_lsb(
                     background_e, pixel.full_well_e, parity
                 )
                 word = word_lsb(
-                    offset_lsb + pixel.gain_lsb_per_e * held_e, pixel.low_lsb, pixel.high_lsb
+                    offset_lsb + pixel.gain_lsb_per_e * (a_e - b_e), pixel.low_lsb, pixel.high_lsb
                 )
                 words[j] = word
                 # The lowest and the highest word report overflow, as those of real imagers do.
@@ -158,6 +194,26 @@ def take_sample_(
                     | (word <= pixel.low_lsb)
                     | (word >= pixel.high_lsb)
                 )
+                near |= (a_e >= near_e) | (b_e >= near_e)
+            if not near:
+                continue
+            # A loop of its own for rows with charges that feel the full well: what they need keeps
+            # a loop from vector instructions.
+            for j in range(columns):
+                background_e = ambient[j] * ambient_e
+                mean_e = HALF * (active[j] * active_e + background_e)
+                half_e = correlation[j] * swing_e
+                if mean_e + abs(half_e) > free_e:
+                    a_e = clipped_e(max(mean_e + half_e, ZERO), normal_a[j], pixel)
+                    b_e = clipped_e(max(mean_e - half_e, ZERO), normal_b[j], pixel)
+                    offset_lsb = pattern[j] + ambient_offset_lsb(
+                        background_e, pixel.full_well_e, parity
+                    )
+                    words[j] = word_lsb(
+                        offset_lsb + pixel.gain_lsb_per_e * (a_e - b_e),
+                        pixel.low_lsb,
+                        pixel.high_lsb,
+                    )
 
 
 @loop
@@ -220,8 +276,16 @@ def mark_scored_(
 
 
 @loop
-def noise_by_gray_(gray: Array, variance_per_word: Array, dark: np.float32, noise: Array) -> None:
-    """Noise of a sample in the light that a gray image shows.
+def noise_by_gray_(
+    gray: Array,
+    variance_per_word: Array,
+    dark: np.float32,
+    offset_variance: Array,
+    offset_per_word: Array,
+    most_offset: np.float32,
+    noise: Array,
+) -> None:
+    """Noise of a sample in the light that a gray image shows, and offset that counts as noise.
 
     Parameters
     ----------
@@ -230,6 +294,11 @@ def noise_by_gray_(gray: Array, variance_per_word: Array, dark: np.float32, nois
         Of a sample, per word of the gray image.
     dark : float32
         Variance of a sample without light.
+    offset_variance, offset_per_word : float32 [B]
+        Variance of the offset, and offset that ambient light adds per word of the gray image; 0
+        where offsets cancel.
+    most_offset : float32
+        Where ambient light fills the taps.
     noise : float32 [B, H, W]
         Standard deviation; is written.
     """
@@ -237,5 +306,10 @@ def noise_by_gray_(gray: Array, variance_per_word: Array, dark: np.float32, nois
     for b in range(frames):
         for i in range(rows):
             for j in range(columns):
-                variance = np.float32(gray[b, i, j]) * variance_per_word[b] + dark
-                noise[b, i, j] = np.sqrt(variance)
+                word = np.float32(gray[b, i, j])
+                offset = min(word * offset_per_word[b], most_offset)
+                known = word * variance_per_word[b] + dark
+                # Twice: an offset stands in both samples, and lengthens them in one direction as
+                # noise of that variance would in both.
+                offsets = offset_variance[b] + offset * offset
+                noise[b, i, j] = np.sqrt(known + offsets + offsets)

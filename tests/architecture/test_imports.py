@@ -58,7 +58,22 @@ room(
 )
 room("shotenv.render.backend")
 room(
-    "shotenv.render", *SIGNAL, "shotenv.config", "shotenv.world.geometry", "shotenv.render.backend"
+    "shotenv.render.surfaces", "unwrap.support", "shotenv.world.geometry", "shotenv.render.backend"
+)
+room(
+    "shotenv.render",
+    *SIGNAL,
+    "shotenv.config",
+    "shotenv.world.geometry",
+    "shotenv.render.backend",
+    "shotenv.render.surfaces",
+)
+room(
+    "shotenv.scenes",
+    "unwrap.support",
+    "shotenv.config",
+    "shotenv.world.geometry",
+    "shotenv.render.surfaces",
 )
 room("shotenv.sensor", *SIGNAL, "shotenv.config")
 room("shotenv.laser", "shotenv.config")
@@ -70,6 +85,7 @@ room(
     *LIGHT,
     "shotenv.render",
     "shotenv.render.backend",
+    "shotenv.scenes",
     "shotenv.sensor",
 )
 room("shotenv.decision", *UNWRAPPING, *SENSING)
@@ -93,7 +109,7 @@ room("agents.cli", *ROOMS)
 ONLY_IN = {
     "mitsuba": "shotenv/render/",
     "drjit": "shotenv/render/",
-    "trimesh": ("shotenv/world/", "unwrap/recordings/"),
+    "trimesh": ("shotenv/world/", "shotenv/scenes/", "unwrap/recordings/"),
     "stable_baselines3": "agents/",
     "lightning": "unwrap/training/",
     "numba": "unwrap/support/compiled.py",

@@ -5,14 +5,14 @@ from functools import cache
 import numpy as np
 
 from shotenv.config.bank import WorldConfig
-from shotenv.config.families import FAMILIES, SHIFT_FAMILIES
+from shotenv.config.families import FAMILIES, SHIFT_FAMILIES, TRAINING_FAMILIES
 from shotenv.world.draw import draw_world
 from shotenv.world.geometry import materials as m, meshes
 from shotenv.world.geometry.model import Mesh
 
 CLIP = WorldConfig()
 SPARSE = WorldConfig(frames_per_clip=3, frame_rate_hz=1.0)
-EVERY = FAMILIES + SHIFT_FAMILIES
+EVERY = FAMILIES + SHIFT_FAMILIES + TRAINING_FAMILIES
 
 
 @cache

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from shotenv.config.bank import CameraConfig
+from shotenv.config.emission import EmissionConfig
 from shotenv.render.instants import Instants
 from shotenv.world.geometry.meshes import join
 from shotenv.world.geometry.model import Light, Mesh, MovingObject, World
@@ -14,7 +15,11 @@ from shotenv.world.geometry.motion import Arc, Pose
 
 DARK = Light(0.0, (0.0, 0.0, 1.0), 0.0, 0.0, ())
 ALBEDO = 0.4
-SMALL = CameraConfig(width=17, height=17, samples_per_pixel=1, gray_instants=1, bounces=1)
+KNIFE_EDGE = EmissionConfig(edge_softness_deg=0.0)
+"""A laser that is even over the field of view and dark beyond: light of a closed form."""
+SMALL = CameraConfig(
+    width=17, height=17, samples_per_pixel=1, gray_instants=1, bounces=1, emission=KNIFE_EDGE
+)
 MIDDLE = (8, 8)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from render_worlds import SMALL, mesh, ray_directions, square, world
 
+from shotenv.config.reader import merged
 from shotenv.render.frame import render_frame
 from shotenv.world.geometry.model import MovingObject
 from shotenv.world.geometry.motion import Arc, Pose
@@ -29,6 +30,7 @@ def passing_square():
 
 @pytest.mark.parametrize("exposure_s", [2.5e-4, 2e-3, 4e-3])
 def test_blur_is_as_long_as_the_square_moves_during_the_exposure(sensor, exposure_s):
+    sensor = merged(sensor, {"veiling_glare": 0.0, "ghost": 0.0})
     frame = render_frame(
         passing_square(), TIME_S, CAMERA, sensor, seed=1, gray_exposure_s=exposure_s
     )

@@ -144,7 +144,14 @@ def test_the_dev_extra_brings_the_independent_renderer():
 @pytest.mark.skipif(
     importlib.util.find_spec("mitransient") is None, reason="the verify extra is not installed"
 )
-@pytest.mark.parametrize("surfaces", [two_walls, box_in_a_room, wall_on_a_floor])
+@pytest.mark.parametrize(
+    "surfaces",
+    [
+        pytest.param(two_walls, marks=pytest.mark.slow),
+        box_in_a_room,
+        pytest.param(wall_on_a_floor, marks=pytest.mark.slow),
+    ],
+)
 def test_phasors_are_those_of_an_independent_transient_renderer(trace, surfaces):
     camera = SMALL.model_copy(update={"width": 16, "height": 16, "horizontal_fov_deg": 120.0})
     scene, samples, seeds = world(mesh(surfaces(), albedo=0.7)), 128, range(6)

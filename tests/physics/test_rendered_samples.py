@@ -37,8 +37,9 @@ BURIED = mesh(square((0, 0, -50.0), (1, 0, 0), (0, 1, 0)))
 
 @pytest.fixture
 def sensor(sensor):
-    """The sensor with sinusoidal light, unless a test says otherwise."""
-    return sensor.model_copy(update={"harmonic_strength": 0.0})
+    """The sensor with sinusoidal light and no stray light, unless a test says otherwise."""
+    off = {"harmonic_strength": 0.0, "veiling_glare": 0.0, "ghost": 0.0}
+    return sensor.model_copy(update=off)
 
 
 def coming(distance_m: float, speed_m_s: float):

@@ -161,9 +161,12 @@ def slow_words(sensor, distance, active, ambient, pattern_lsb, normals, row):
         for sign, normal in zip((1, -1), normals[k], strict=True):
             light = active * POWER_W * (1 + sign * sensor.contrast * correlated) + ambient
             charge = rate * light / 2
-            charge += math.sqrt(charge + sensor.read_noise_e**2) * normal
-            saturated |= charge >= sensor.full_well_e
-            taps.append(min(charge, sensor.full_well_e))
+            packet = charge + math.sqrt(charge + sensor.read_noise_e**2) * normal
+            saturated |= packet >= sensor.full_well_e
+            # Of a full tap the reading alone is noisy; none here is about to fill.
+            full = charge > sensor.full_well_e
+            held = sensor.full_well_e + sensor.read_noise_e * normal
+            taps.append(held if full else packet)
         filled = min(rate * ambient / 2 / sensor.full_well_e, 1.0)
         parity_lsb = sensor.offset_ambient_lsb * filled * (-1) ** row
         word = round((taps[0] - taps[1]) * sensor.gain_lsb_per_e + pattern_lsb + parity_lsb)
@@ -193,13 +196,14 @@ def slow_depth(words, saturated, offset_lsb, predicted, noise_lsb, shift_m, know
     for part, range_m, table in zip(parts, ranges, known.wiggle, strict=False):
         phase, amplitude = slow_phase(part, offset_lsb, table, shift_m / range_m * TWO_PI)
         wrapped.append(phase / TWO_PI * range_m)
+        strong = amplitude >= known.min_snr * noise_lsb
         if len(wrapped) == 1:
-            valid = amplitude >= known.min_snr * noise_lsb and not saturated
+            valid = strong and not saturated
     near = wrapped[0] + ranges[0] * max(0, round((predicted - wrapped[0]) / ranges[0]))
     distance = predicted if wrapped[0] >= known.saturation_range_m else near
     if len(wrapped) == 2:
         fused, apart = slow_dual(wrapped, ranges, known)
-        distance = fused if apart <= known.max_residual_m else distance
+        distance = fused if strong and apart <= known.max_residual_m else distance
     return (distance if valid else predicted), valid
 
 

@@ -144,10 +144,10 @@ def slow_reference(exposure, sensor, noise, pattern, y, x):
         taps = []
         for tap, sign in enumerate((1, -1)):
             charge = max((signal + ambient) / 2 + sign * modulated / 2, 0.0)
+            normal = float(noise[0, k, tap, y, x])
             sigma = math.sqrt(charge + sensor.read_noise_e**2)
-            charge += sigma * float(noise[0, k, tap, y, x])
-            saturated |= charge >= sensor.full_well_e
-            taps.append(min(charge, sensor.full_well_e))
+            saturated |= charge + sigma * normal >= sensor.full_well_e
+            taps.append(read_tap(charge, sensor, normal))
         parity = 1 if y % 2 == 0 else -1
         rises = sensor.offset_ambient_lsb * min(ambient / 2 / sensor.full_well_e, 1.0)
         offset = float(pattern.pattern_lsb[0, y, x]) + parity * rises
@@ -155,6 +155,21 @@ def slow_reference(exposure, sensor, noise, pattern, y, x):
         samples.append(min(max(word, -2048), 2047))
         saturated |= not -2047 <= word <= 2046
     return samples, saturated
+
+
+def read_tap(charge, sensor, normal):
+    """A charge cut off by the full well, and read; mean and variance by integration."""
+    read = sensor.read_noise_e**2
+    if abs(charge - sensor.full_well_e) > 6 * math.sqrt(charge):
+        held = min(charge, sensor.full_well_e)
+        return held + normal * math.sqrt((charge if held == charge else 0.0) + read)
+    steps = torch.linspace(-9, 9, 20_001, dtype=torch.float64)
+    weight = torch.exp(-steps.square() / 2)
+    weight /= weight.sum()
+    cut = (charge + math.sqrt(charge) * steps).clamp(max=sensor.full_well_e)
+    mean = float((weight * cut).sum())
+    variance = float((weight * (cut - mean).square()).sum())
+    return mean + normal * math.sqrt(variance + read)
 
 
 def test_a_slow_loop_over_pixels_gives_the_same_words(sensor):

@@ -74,7 +74,9 @@ def make_table(
     folder = out if page is None else page
     # The first training planned is always on clips and rendered truth, as the figure needs.
     frames = open_splits(wanted[0].config)("test")
-    write_json(folder / NUMBERS, {"config": config.model_dump(mode="json"), "rows": rows})
+    # With what the pixels were scored by, which the configuration does not tell.
+    numbers = {"config": config.model_dump(mode="json"), "min_snr": frames.sensor.min_snr}
+    write_json(folder / NUMBERS, {**numbers, "rows": rows})
     write_bytes(folder / PAGE, render_page(config, frames.sensor, rows).encode())
     write_bytes(folder / FIGURE, _figure_png(networks, frames))
     say(f"{folder / PAGE}, {NUMBERS} and {FIGURE} are written")

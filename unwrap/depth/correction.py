@@ -1,7 +1,7 @@
 """Correction: raw samples and a network's prediction to unwrapped depth.
 
 Two or four samples are decoded and merged with the prediction; eight are unwrapped by their two
-frequencies, and need the prediction only where these disagree.
+frequencies, and need the prediction only where these disagree or the second is too weak to tell.
 """
 
 from __future__ import annotations
@@ -113,10 +113,10 @@ class _Calibration(NamedTuple):
 def _by_two_frequencies(
     raw: RawFrame, predicted_m: Tensor | None, calibration: _Calibration, merge: Merge
 ) -> DepthFrame:
-    """Eight samples: the prediction is asked only where the frequencies disagree."""
+    """Eight samples: the prediction is asked where f2 is weak or the frequencies disagree."""
     sensor, first = calibration.sensor, calibration.first_phase(raw)
-    # Of the second frequency nothing but the phase is needed, so it is not decoded as a whole.
-    cosine, sine, *_ = quadratures(samples_at(1, raw), calibration.offset_lsb)
+    # Of the second frequency no residual is needed, so it is not decoded as a whole.
+    cosine, sine, amplitude, _ = quadratures(samples_at(1, raw), calibration.offset_lsb)
     depth_m, residual_m = unwrap_dual(
         first.phase_rad,
         phase_at(1, cosine, sine, sensor, shift_m=calibration.shift_m),
@@ -124,7 +124,11 @@ def _by_two_frequencies(
         sensor.f2_hz,
         max_range_m=sensor.max_range_m,
     )
-    agree, valid = residual_m <= sensor.max_residual_m, calibration.valid(first, raw)
+    # A phase of noise agrees by chance: what is lost at f2 tells as little as what disagrees.
+    agree = (residual_m <= sensor.max_residual_m) & is_strong(
+        amplitude, calibration.noise_lsb, sensor
+    )
+    valid = calibration.valid(first, raw)
     if predicted_m is None:
         return _frame(depth_m, valid & agree, first, torch.nan, sensor)
     depth_m = torch.where(agree, depth_m, _merged(first, predicted_m, sensor, merge))

@@ -33,7 +33,7 @@ def evaluate(
     sensor: SensorDescription,
     *,
     offset_lsb: Tensor | None = None,
-    noise_lsb: Tensor | float | None = None,
+    noise_lsb: Tensor | float | Mapping[Shots, Tensor] | None = None,
     shift_m: Tensor | None = None,
 ) -> Scores:
     """Score the prediction alone and every method that the given acquisitions allow.
@@ -50,7 +50,7 @@ def evaluate(
     scored : bool [B, H, W]
         Pixels that count, whether or not a method calls them valid.
     offset_lsb, noise_lsb, shift_m : optional
-        As in `unwrap.depth.correction.correct`.
+        As in `unwrap.depth.correction.correct`; the noise may be that of each acquisition.
 
     Returns
     -------
@@ -68,6 +68,7 @@ def evaluate(
         guesses = {f"{shots:d} DCS prediction": own_m for shots, own_m in predicted_m.items()}
     scores = {name: score(own_m, truth_m, scored, half_m) for name, own_m in guesses.items()}
     for shots, raw in raws.items():
+        own_noise_lsb = noise_lsb[shots] if isinstance(noise_lsb, Mapping) else noise_lsb
         for name, merge in _methods(shots).items():
             if merge is None:
                 first = decode_at(0, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m)
@@ -79,7 +80,7 @@ def evaluate(
                     sensor,
                     merge=merge,
                     offset_lsb=offset_lsb,
-                    noise_lsb=noise_lsb,
+                    noise_lsb=own_noise_lsb,
                     shift_m=shift_m,
                 )
                 depth_m, valid = frame.distance_m, frame.valid

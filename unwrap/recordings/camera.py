@@ -24,6 +24,9 @@ class Camera:
     merge : "nearest", "floor" or "none"
     horizontal_fov_deg : float
         Horizontal field of view.
+    noise_lsb : float or None
+        Standard deviation of one sample where it is told; None leaves it to each recording's own
+        samples, see `unwrap.recordings.sample_noise`.
     """
 
     description: SensorDescription
@@ -31,6 +34,7 @@ class Camera:
     unwrapper: str
     merge: Merge
     horizontal_fov_deg: float
+    noise_lsb: float | None = None
 
 
 def camera_of(
@@ -43,7 +47,7 @@ def camera_of(
     wiggle: Path | None = None,
     noise_lsb: float | None = None,
 ) -> Camera:
-    """Camera with a sensor like `description`, but maybe with tables and dark noise of its own.
+    """Camera with a sensor like `description`, but maybe with tables and noise of its own.
 
     Parameters
     ----------
@@ -54,7 +58,7 @@ def camera_of(
     wiggle : Path, optional
         Tables measured with this camera, at both frequencies, in place of those of its kind.
     noise_lsb : float, optional
-        Standard deviation of one sample, in place of that of its kind.
+        Standard deviation of one sample, in place of what recordings tell and of its kind's.
 
     Raises
     ------
@@ -70,7 +74,7 @@ def camera_of(
         if not 0 <= noise_lsb <= 2**bits:
             raise ValueError(f"noise_lsb is {noise_lsb:g}; expected 0 to {2**bits}")
         description = replace(description, noise_lsb=noise_lsb)
-    return Camera(description, bits, unwrapper, merge, horizontal_fov_deg)
+    return Camera(description, bits, unwrapper, merge, horizontal_fov_deg, noise_lsb)
 
 
 def _tables_at_both(path: Path, sensor: SensorDescription) -> tuple[WiggleTable, WiggleTable]:

@@ -87,14 +87,17 @@ def _npy(array: np.ndarray) -> bytes:
     return content.getvalue()
 
 
-def frame_statistics(frame: CorrectedFrame) -> dict[str, float | int]:
-    """Shares of valid and saturated pixels, median distance, pixels beyond what a PNG holds."""
+def frame_statistics(frame: CorrectedFrame) -> dict[str, float | int | str]:
+    """Shares of valid and saturated pixels, median distance, pixels beyond what a PNG holds, and
+    the noise that decided what is valid."""
     distances = frame.depth.distance_m[frame.depth.valid]
     return {
         "valid_share": frame.depth.valid.double().mean().item(),
         "saturated_share": frame.recording.raw.saturated.double().mean().item(),
         "median_m": distances.median().item(),
         "pixels_beyond_png": int((distances * 1000 > HIGHEST_MM).sum()),
+        "noise_lsb": frame.noise.noise_lsb.median().item(),
+        "noise_source": frame.noise.source,
     }
 
 

@@ -10,6 +10,7 @@ from unwrap.depth import correct
 from unwrap.networks import load_unwrapper
 from unwrap.recordings.camera import Camera
 from unwrap.recordings.recording import NoUsablePixelError, Recording
+from unwrap.recordings.sample_noise import SampleNoise, noise_of
 from unwrap.signal import DepthFrame, Sensed
 
 
@@ -24,11 +25,14 @@ class CorrectedFrame:
     depth : DepthFrame
     confidence : float32 [1, H, W] or None
         The network's; None where none was asked.
+    noise : SampleNoise
+        What counted as noise, and where that is known from.
     """
 
     recording: Recording
     depth: DepthFrame
     confidence: Tensor | None
+    noise: SampleNoise
 
 
 def correct_recording(recording: Recording, camera: Camera) -> list[CorrectedFrame]:
@@ -46,23 +50,23 @@ def correct_recording(recording: Recording, camera: Camera) -> list[CorrectedFra
     # One at a time: the feature maps of a long recording would not fit into memory.
     for number in range(len(recording.names)):
         one, prediction = recording.frame(number), None
+        noise = noise_of(one.raw, camera)
         if unwrapper is not None and one.gray is not None:
             # A recording has one map for all frames, a batch of frames one for each.
             offset_lsb = None if one.offset_lsb is None else one.offset_lsb.unsqueeze(0)
-            sensed = Sensed(one.gray, one.raw, offset_lsb)
+            sensed = Sensed(one.gray, one.raw, offset_lsb, noise.noise_lsb)
             prediction = unwrapper.predict_sensed(sensed, camera.description)
-        # Recordings tell no noise of their own: what counts as strong is measured by the dark noise
-        # of the camera's description.
         depth = correct(
             one.raw,
             None if prediction is None else prediction.distance_m,
             camera.description,
             merge=camera.merge,
             offset_lsb=one.offset_lsb,
+            noise_lsb=noise.noise_lsb,
         )
         _require_valid(one, depth)
         confidence = None if prediction is None else prediction.confidence
-        frames.append(CorrectedFrame(one, depth, confidence))
+        frames.append(CorrectedFrame(one, depth, confidence, noise))
     return frames
 
 

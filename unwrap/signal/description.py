@@ -22,7 +22,9 @@ class SensorDescription:
     noise_lsb : float
         Standard deviation of one sample in the dark, used where no better estimate is given.
     min_snr : float
-        Amplitude over noise below which a pixel is invalid.
+        Decoded amplitude over the noise of one sample below which a pixel is invalid. Noise alone
+        reaches k with probability exp(-k^2 / 2) in two samples, whose amplitude is as noisy as
+        they are, and exp(-k^2) in four: 1.1 % and .01 % at 3.
     max_residual_m : float
         Disagreement of the two frequencies above which they are not trusted: the pixel is merged
         with the prediction, or invalid without one. With 24 and 10 MHz candidates within 25 m lie
@@ -36,6 +38,6 @@ class SensorDescription:
     max_range_m: float = 25.0
     saturation_range_m: float = 6.2
     noise_lsb: float = 1.5
-    min_snr: float = 1.0
+    min_snr: float = 3.0
     max_residual_m: float = 1.0
     wiggle: tuple[WiggleTable, WiggleTable] | None = None

@@ -3,7 +3,7 @@
 Masks over pixels are bool [B, H, W], and each word for one means the same everywhere:
 
 saturated : a tap was full or the converter overflowed in any sample.
-strong : amplitude over noise reaches `SensorDescription.min_snr`.
+strong : decoded amplitude over a sample's noise reaches `SensorDescription.min_snr`.
 valid : strong and not saturated, and what else a method asks for; the distance may be used.
 known : the true, or the remembered, distance of the pixel is known.
 unclamped : the true distance is the pixel's own, and not the largest that a network predicts.
@@ -72,7 +72,8 @@ class DepthFrame:
         Radial distance in metres; where not `valid` the best guess there is (the network's
         prediction), or NaN where there is none.
     valid : bool [B, H, W]
-        Signal strong enough, not saturated, frequencies agree.
+        Strong and not saturated; of eight samples without a prediction also strong at f2, and the
+        frequencies agree.
     phase_rad : float32 [B, H, W]
         Phase at f1 in [0, 2 pi), the wrapped map that the distance was unwrapped from.
     amplitude : float32 [B, H, W]

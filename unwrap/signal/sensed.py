@@ -109,7 +109,9 @@ def sample_noise_lsb(sensed: Sensed, sensor: SensorDescription) -> Tensor | floa
 
 
 def is_strong(amplitude: Tensor, noise_lsb: Tensor | float, sensor: SensorDescription) -> Tensor:
-    """Where amplitude over the noise of one sample reaches `min_snr`, bool.
+    """Where the decoded amplitude over the noise of one sample reaches `min_snr`, bool.
+
+    How often noise alone does, see `SensorDescription.min_snr`.
 
     Examples
     --------

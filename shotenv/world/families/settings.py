@@ -8,7 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from shotenv.config import Family
-from shotenv.world.families import construction, forest, garage, roads, snow, tunnel, warehouse
+from shotenv.world.families import (
+    clutter,
+    construction,
+    forest,
+    garage,
+    roads,
+    snow,
+    tunnel,
+    warehouse,
+)
 from shotenv.world.geometry import Light, Site, lights
 from unwrap.support import Range
 
@@ -142,5 +151,14 @@ SETTINGS: dict[Family, Setting] = {
         sun_night_or_clouds(0.5, 0.7, night_share=0.2),
         snow_share=1.0,
         snow_cover=(0.7, 1.0),
+    ),
+    # For networks to learn from, and in no other split: `TRAINING_FAMILIES` there.
+    "clutter": Setting(
+        (
+            Place(clutter.lay_out_room, (0.0, 1.5), 0.35),
+            Place(clutter.lay_out_hall, (0.0, 6.0), 0.35),
+            Place(clutter.lay_out_open_ground, (0.0, 12.0), 0.30),
+        ),
+        sun_night_or_clouds(0.35, 0.4, night_share=0.25),
     ),
 }

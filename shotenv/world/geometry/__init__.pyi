@@ -26,6 +26,7 @@ from .motion import (
     rotation as rotation,
     yaw_rate_rad_s as yaw_rate_rad_s,
 )
+from .mounting import mounted as mounted
 from .mover import (
     Along as Along,
     Mover as Mover,

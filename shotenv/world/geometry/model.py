@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -157,9 +158,12 @@ that one kernel fits all."""
 
 @dataclass(frozen=True)
 class World:
-    """Everything a clip of frames is rendered from; drawn from `seed` and `family` alone."""
+    """Everything a clip of frames is rendered from.
 
-    family: Family
+    Drawn from `seed` and `family` alone, or read from a file: the family is then "own".
+    """
+
+    family: Family | Literal["own"]
     seed: int
     static: Mesh
     moving: tuple[MovingObject, ...]

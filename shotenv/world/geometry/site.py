@@ -160,7 +160,9 @@ class Site:
     def put(self, mesh: Mesh, x: float, y: float, yaw: float = 0.0, z: float = 0.0) -> bool:
         """Stand a thing at (x, y) on a floor of height `z`; false if there is no room."""
         pose = Pose((x, y, z), yaw)
-        free = self._claim(mesh.corners.reshape(-1, 3), len(mesh.corners), [pose])
+        points = mesh.corners.reshape(-1, 3)
+        outline = np.concatenate([below(mesh.corners, HEADROOM_M), points[[points[:, 2].argmax()]]])
+        free = self._claim(outline, len(mesh.corners), [pose])
         if free:
             self._add(weathered(meshes.place(mesh, pose), self.weather), counts=False)
         return free
@@ -261,7 +263,7 @@ class Site:
 def footprints(points: np.ndarray, poses: list[Pose]) -> np.ndarray:
     """Ground rectangles [T, 2, 2] ((low, high), (x, y)) of points [N, 3] below the headroom."""
     points = points.astype(np.float64)
-    points = points[points[:, 2] < HEADROOM_M, :2]
+    points = points[points[:, 2] <= HEADROOM_M, :2]
     (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
     return rectangles((x0, x1), (y0, y1), poses)
 
@@ -274,6 +276,23 @@ def rectangles(x: Range, y: Range, poses: list[Pose]) -> np.ndarray:
     turn = np.moveaxis(np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]]), -1, 0)
     placed = outline @ turn + np.array([pose.position_m[:2] for pose in poses])[:, None]
     return np.stack([placed.min(axis=1), placed.max(axis=1)], axis=1)
+
+
+def below(corners: np.ndarray, height_m: float) -> np.ndarray:
+    """Points float64 [N, 3] that span what is below a height of the triangles [F, 3, 3].
+
+    Their corners there, and where their edges cross the height: a slanting panel may have only one
+    corner below it.
+    """
+    start = corners.astype(np.float64).reshape(-1, 3)
+    end = np.roll(corners.astype(np.float64), -1, axis=1).reshape(-1, 3)
+    low = start[:, 2] < height_m
+    crosses = low != (end[:, 2] < height_m)
+    start_z, end_z = start[crosses, 2:], end[crosses, 2:]
+    share = (height_m - start_z) / (end_z - start_z)
+    crossings = start[crosses] + share * (end[crosses] - start[crosses])
+    crossings[:, 2] = height_m
+    return np.concatenate([start[low], crossings])
 
 
 def near(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -27,10 +27,12 @@ def clip_arrays(seed: int) -> dict[str, np.ndarray]:
     return arrays
 
 
-def clip_metadata(name: str, seed: int, split: str = "train") -> dict[str, object]:
+def clip_metadata(
+    name: str, seed: int, split: str = "train", family: str = "garage"
+) -> dict[str, object]:
     per_frame = [float(number) for number in range(FRAMES)]
     keys = ("time_s", "ego_speed_m_s", "yaw_rate_rad_s", "gray_exposure_s")
-    return {"name": name, "family": "garage", "seed": seed, "split": split} | dict.fromkeys(
+    return {"name": name, "family": family, "seed": seed, "split": split} | dict.fromkeys(
         keys, per_frame
     )
 
@@ -114,6 +116,22 @@ def test_all_leaves_the_shift_split_out(shifted_bank):
     assert [clip.split for clip in bank.splits("all")] == ["train"] * 3 + ["test"]
     assert [clip.name for clip in bank.splits("shift")] == ["c4"]
     assert bank.frames("shift").tolist() == list(range(4 * FRAMES, 5 * FRAMES))
+
+
+def test_clutter_is_in_the_train_split_alone(tmp_path):
+    kinds = [("train", "garage")] * 3 + [("test", "garage"), ("train", "clutter")]
+    records = [
+        write_clip(tmp_path / "clips" / f"c{i}", clip_arrays(i), clip_metadata(f"c{i}", i, *kind))
+        for i, kind in enumerate(kinds)
+    ]
+    write_manifest(tmp_path, "cluttered", records, (HEIGHT, WIDTH))
+    bank = open_bank(tmp_path)
+    found = {"train": ["garage"] * 3 + ["clutter"], "test": ["garage"], "all": ["garage"] * 4}
+    for split, families in found.items():
+        assert [clip.family for clip in bank.splits(split)] == families
+    # The random split would deal it to its test part as well.
+    dealt = [bank.frames(part, by="frame") for part in ("train", "validation", "test")]
+    assert sorted(torch.cat(dealt).tolist()) == list(range(4 * FRAMES))
 
 
 def test_a_bank_without_shift_clips_says_so(bank_folder):

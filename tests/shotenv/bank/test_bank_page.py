@@ -9,7 +9,7 @@ import pytest
 
 from shotenv.bank.contents import known_banks
 from shotenv.config.bank import BankConfig
-from shotenv.config.families import FAMILIES, SHIFT_FAMILIES
+from shotenv.config.families import FAMILIES, SHIFT_FAMILIES, TRAINING_FAMILIES
 from shotenv.config.reader import find_config, read_config
 
 TEXT = (Path(__file__).parents[3] / "docs" / "bank.md").read_text(encoding="utf-8")
@@ -20,19 +20,16 @@ BANKS = {bank["name"]: bank for bank in known_banks()}
 def row_of(name: str) -> str:
     """The row of the table that the configuration `name` calls for."""
     config, bank = read_config(BankConfig, find_config("bank", name)), BANKS[name]
-    world, clips = config.world, {split: count for split, (count, _) in config.clips.items()}
-    frames = {
-        split: count * len(families) * world.frames_per_clip
-        for split, (count, families) in config.clips.items()
-    }
-    assert sum(frames.values()) == bank["frames"]
+    world, clips = config.world, [count for _, count, _ in config.clips]
+    frames = [count * len(families) * world.frames_per_clip for _, count, families in config.clips]
+    assert sum(frames) == bank["frames"]
     cells = [
         f"`{name}`",
         str(bank["frames"]),
         f"{bank['width']} x {bank['height']}",
-        "{train}, {validation}, {test}; {shift}".format(**clips),
+        "{}, {}, {}; {}; {}".format(*clips),
         f"{world.frames_per_clip} at {world.frame_rate_hz:g} Hz",
-        "{train}, {validation}, {test}; {shift}".format(**frames),
+        "{}, {}, {}; {}; {}".format(*frames),
         f"{bank['bytes'] / 1e9:.1f} GB",
     ]
     return f"| {' | '.join(cells)} |"
@@ -48,5 +45,5 @@ def test_the_row_of_a_bank_says_what_its_configuration_gives(name):
 
 
 def test_the_families_are_as_many_as_the_page_says():
-    assert "of each of five families; shift of each of four" in TEXT
-    assert (len(FAMILIES), len(SHIFT_FAMILIES)) == (5, 4)
+    assert "of each of five families; shift of each of four; clutter of one" in TEXT
+    assert (len(FAMILIES), len(SHIFT_FAMILIES), len(TRAINING_FAMILIES)) == (5, 4, 1)

@@ -15,26 +15,28 @@ from shotenv.config.bank import BankConfig
 from shotenv.config.families import FAMILIES, SHIFT_FAMILIES
 from shotenv.config.reader import ConfigError, find_config, merged, read_config
 
+COUNTS = ("train_clips", "validation_clips", "test_clips", "shift_clips", "clutter_clips")
+
 
 @pytest.fixture
 def config():
     starter = read_config(BankConfig, find_config("bank", "starter"))
-    counts = ("train_clips", "validation_clips", "test_clips", "shift_clips")
-    return merged(starter, dict.fromkeys(counts, 1))
+    return merged(starter, dict.fromkeys(COUNTS, 1))
 
 
 def test_clip_jobs_cover_every_family_and_split_with_seeds_of_their_own(config, tmp_path):
     jobs = clip_jobs(config, tmp_path)
-    assert len({job.seed for job in jobs}) == len(jobs) == 15 + len(SHIFT_FAMILIES)
+    assert len({job.seed for job in jobs}) == len(jobs) == 15 + 4 + 1
     assert {(job.split, job.family) for job in jobs} == {
         (split, family)
         for split in ("train", "validation", "test")
         for family in config.world.families
-    } | {("shift", family) for family in SHIFT_FAMILIES}
+    } | {("shift", family) for family in SHIFT_FAMILIES} | {("train", "clutter")}
 
 
-def test_shift_clips_leave_the_other_clips_as_they_were(config, tmp_path):
-    without = clip_jobs(merged(config, {"shift_clips": 0}), tmp_path)
+@pytest.mark.parametrize("added", [("clutter_clips",), ("clutter_clips", "shift_clips")])
+def test_added_clips_leave_the_other_clips_as_they_were(config, tmp_path, added):
+    without = clip_jobs(merged(config, dict.fromkeys(added, 0)), tmp_path)
     kept = clip_jobs(config, tmp_path)[: len(without)]
     assert [(j.name, j.seed) for j in kept] == [(j.name, j.seed) for j in without]
 
@@ -43,9 +45,13 @@ def test_shift_clips_leave_the_other_clips_as_they_were(config, tmp_path):
     ("change", "message"),
     [
         (
-            dict.fromkeys(("train_clips", "validation_clips", "test_clips", "shift_clips"), 0),
+            dict.fromkeys(COUNTS, 0),
             "at least one clip",
         ),
+        ({"clutter_clips": -1}, "clutter_clips"),
+        ({"world": {"families": ["garage", "clutter"]}}, "clutter, which is for training only"),
+        ({"shift_mean_speed_m_s": -0.1}, "shift_mean_speed_m_s"),
+        ({"shift_mean_speed_m_s": 20.0}, r"shift_mean_speed_m_s is 20; .*speed_m_s, 15"),
         ({"shift_clips": -1}, "shift_clips"),
         ({"shift_clips": 1.5}, "shift_clips"),
         ({"world": {"families": ["garage", SHIFT_FAMILIES[0]]}}, f"{SHIFT_FAMILIES[0]}, which"),
@@ -61,7 +67,7 @@ def test_impossible_banks_are_refused(config, change, message):
 def test_held_out_families_may_be_trained_on_where_none_is_held_out(config):
     families = (*FAMILIES, *SHIFT_FAMILIES)
     opened = merged(config, {"world": {"families": families}, "shift_clips": 0})
-    assert opened.clips["train"] == (1, families)
+    assert opened.clips[0] == ("train", 1, families)
 
 
 def test_nearfield_is_of_the_papers_size_and_splits_80_10_10():
@@ -78,6 +84,30 @@ def test_nearfield_is_of_the_papers_size_and_splits_80_10_10():
     assert len(jobs) * per_clip == 2048
     assert (config.camera.width, config.camera.height) == (320, 240)
     assert len(set(Counter(j.family for j in jobs if j.split == "test").values())) == 1
+
+
+def frames_of(name):
+    """Configuration of a bank that comes along, and its frames by split and family."""
+    config = read_config(BankConfig, find_config("bank", name))
+    jobs = clip_jobs(config, find_config("bank", name))
+    return config, {
+        kind: clips * config.world.frames_per_clip
+        for kind, clips in Counter((job.split, job.family) for job in jobs).items()
+    }
+
+
+def test_starter_has_1104_frames_and_no_clutter():
+    _, frames = frames_of("starter")
+    assert sum(frames.values()) == 1104
+    assert {frames["shift", family] for family in SHIFT_FAMILIES} == {4 * 24}
+    assert "clutter" not in {family for _, family in frames}
+
+
+def test_a_fifth_of_the_frames_to_train_on_is_clutter():
+    _, frames = frames_of("training")
+    train = {family: count for (split, family), count in frames.items() if split == "train"}
+    assert train["clutter"] / sum(train.values()) == pytest.approx(0.2, abs=0.01)
+    assert [split for split, family in frames if family == "clutter"] == ["train"]
 
 
 def test_shipped_banks_share_no_world():

@@ -37,6 +37,10 @@ OTHER_SENSOR = {
     "wavelength_nm": 850.0,
     "f_number": 2.0,
     "lens_transmission": 0.5,
+    "veiling_glare": 0.05,
+    "veiling_glare_width": 0.5,
+    "ghost": 0.01,
+    "ghost_width": 0.1,
     "pixel_pitch_m": 10e-6,
     "fill_factor": 0.5,
     "quantum_efficiency": 0.5,
@@ -63,12 +67,14 @@ OTHER_CAMERA = {
     "samples_per_pixel": 2,
     "gray_instants": 2,
     "bounces": 3,
+    "emission": {"edge_softness_deg": 2.0},
 }
 OTHER_WORLD = {
     "families": ("garage",),
     "speed_m_s": (1.0, 2.0),
     "frame_rate_hz": 5.0,
     "frames_per_clip": 3,
+    "mounts": ({"position_m": (0.0, 0.5, 0.0)},),
 }
 OTHER_LASER = {
     "optical_power_w": (2.0, 3.0),

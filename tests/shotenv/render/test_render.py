@@ -21,9 +21,9 @@ from shotenv.render.backend import llvm, workers
 from shotenv.render.backend.llvm import RendererError, find_llvm
 from shotenv.render.backend.workers import run_jobs
 from shotenv.render.frame import render_frame
-from shotenv.render.geometry import REACH_M, faces_of, posed, tile_grid
 from shotenv.render.instants import frame_instants
-from shotenv.render.texture import noise_texture
+from shotenv.render.surfaces.geometry import REACH_M, faces_of, posed, tile_grid
+from shotenv.render.surfaces.texture import noise_texture
 from shotenv.world.geometry.model import Lamp, Light, MovingObject
 from shotenv.world.geometry.motion import Arc, Pose, rotation
 from unwrap.signal.shots import sample_times_s
@@ -259,6 +259,7 @@ def test_jobs_come_back_with_their_results_from_replaced_workers():
     assert not multiprocessing.active_children()
 
 
+@pytest.mark.slow
 def test_workers_share_the_cores_with_torch_too():
     share = max(1, workers.available_cores() // 2)
     assert dict(run_jobs(torch_jobs.threads, [0], workers=2)) == {0: share}

@@ -58,8 +58,9 @@ def test_scored_pixels_and_noise_are_those_of_the_python_loop(light, pixel, draw
     assert np.array_equal(*found) and 0.1 < found[0].mean() < 0.9
     gray, per_word = (4095 * draw((2, ROWS, COLUMNS))).astype(np.uint16), draw(2)
     noise = [np.empty_like(truth_m) for _ in range(2)]
-    pixel_loops.noise_by_gray_(gray, per_word, np.float32(3.0), noise[0])
-    pixel_loops.noise_by_gray_.py_func(gray, per_word, np.float32(3.0), noise[1])
+    offset = draw(2), draw(2, 0.0, 0.01), np.float32(8.0)
+    pixel_loops.noise_by_gray_(gray, per_word, np.float32(3.0), *offset, noise[0])
+    pixel_loops.noise_by_gray_.py_func(gray, per_word, np.float32(3.0), *offset, noise[1])
     assert np.array_equal(*noise)
 
 

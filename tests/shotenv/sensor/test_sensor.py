@@ -174,7 +174,8 @@ def test_the_sensor_knows_its_ambient_noise_from_gray(sensor):
     gray, exposure_s = capture_gray(ambient, sensor, noise=None)
     integration_s = torch.tensor([6e-4])
     ambient_e = electrons_per_radiance_second(sensor) * 0.7 * 6e-4
-    expected = sensor.gain_lsb_per_e * math.sqrt(ambient_e + 2 * sensor.read_noise_e**2)
+    noise_lsb = sensor.gain_lsb_per_e * math.sqrt(ambient_e + 2 * sensor.read_noise_e**2)
+    expected = math.hypot(noise_lsb, math.sqrt(1 / 12))  # rounding to words
     found = sample_noise_lsb(gray, exposure_s, integration_s, sensor)
     assert found.mean().item() == pytest.approx(expected, rel=1e-3)
 

@@ -8,6 +8,7 @@ import trimesh
 from drawn_worlds import EVERY, plain_box
 
 from shotenv.config.bank import WorldConfig
+from shotenv.config.families import FAMILIES, SHIFT_FAMILIES
 from shotenv.world.draw import draw_world
 from shotenv.world.ego import ACCELERATION_M_S2, LANE_MANNERS, PARKING_MANNERS, draw_ego
 from shotenv.world.families.settings import SETTINGS
@@ -294,7 +295,7 @@ def test_night_falls_and_lamps_come_on_in_some_clips():
     assert Lamp((0.0, 0.0, 5.0), 1.0).share_on(-1.0) == 1.0
 
 
-@pytest.mark.parametrize("family", EVERY)
+@pytest.mark.parametrize("family", FAMILIES + SHIFT_FAMILIES)
 def test_a_world_goes_on_where_a_drive_of_384_m_ends(family):
     config = WorldConfig(frames_per_clip=256, speed_m_s=(14.99, 15.0))
     world = draw_world(family, 1, config)

@@ -23,10 +23,10 @@ from drawn_worlds import (
 from shotenv.config.bank import WorldConfig
 from shotenv.config.families import FAMILIES
 from shotenv.world.draw import draw_world
-from shotenv.world.geometry import lights, meshes
+from shotenv.world.geometry import lights, materials as m, meshes
 from shotenv.world.geometry.motion import Arc, Pose, ground_speed_m_s
 from shotenv.world.geometry.mover import Mover, Rigid, posed
-from shotenv.world.geometry.site import MAX_TRIANGLES, STRETCH_M, Site
+from shotenv.world.geometry.site import MAX_TRIANGLES, STRETCH_M, Site, below, footprints
 
 UNAMBIGUOUS_M = 6.2457
 
@@ -59,7 +59,7 @@ def cast(corners, origin, directions):
     return np.where(hit, distance, np.inf)
 
 
-def view(pose, columns=16, rows=12):
+def view(pose, columns=12, rows=9):
     """Directions of a coarse grid of camera rays, 60 degrees across."""
     half = np.tan(np.radians(30.0))
     y, z = np.meshgrid(np.linspace(half, -half, columns), np.linspace(half, -half, rows) * 0.75)
@@ -289,6 +289,14 @@ def test_site_keeps_the_way_and_the_ground_free():
     assert site.put_moving(box, Arc(Pose((5.0, -6.0, 0.0), -np.pi / 2), 12.0))
     assert len(site.static) == 1
     assert len(site.moving) == 1
+
+
+def test_a_slanting_panel_takes_the_ground_below_all_of_it_that_is_low():
+    """Of its four corners only those at the foot are lower than the headroom of 2 m."""
+    corners = [(0.0, -1.0, 0.0), (3.0, -1.0, 4.0), (3.0, 1.0, 4.0), (0.0, 1.0, 0.0)]
+    panel = meshes.polygon(corners, m.Material(0.2, 0.3))
+    taken = footprints(below(panel.corners, 2.0), [Pose((0.0, 0.0, 0.0))])
+    assert taken[0].tolist() == [[0.0, -1.0], [1.5, 1.0]]
 
 
 def test_site_lets_crowns_hang_over_and_rooms_end():

@@ -10,7 +10,7 @@ import pytest
 from drawn_worlds import plain_box
 
 from shotenv.world import families, things
-from shotenv.world.families import construction, forest, snow, warehouse
+from shotenv.world.families import clutter, construction, forest, snow, warehouse
 from shotenv.world.geometry import Mover, materials as m, meshes
 from shotenv.world.things import (
     buildings,
@@ -54,6 +54,14 @@ SIZED = {
     warehouse.dock_door: 3.0,
     warehouse.pallet_rack: 3,
     construction.unfinished_wall: 6.0,
+    clutter.solid_box: 1.0,
+    clutter.cylinder: 1.0,
+    clutter.sphere: 1.0,
+    clutter.turned_solid: 1.0,
+    clutter.lump: 1.0,
+    clutter.panel: 1.0,
+    clutter.shelf: 1.0,
+    clutter.street_thing: 1.0,
 }
 DRAWS = (
     {draw.__name__: draw for draw in ASSETS}

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -78,7 +79,7 @@ def test_the_page_in_the_documentation_is_made_of_its_numbers():
     made = json.loads((DOCS / "unwrapping.json").read_text(encoding="utf-8"))
     config = TableConfig(**made["config"])
     sensor = description_of(read_config(SensorConfig, find_config("sensor", config.sensor)))
-    page = render_page(config, sensor, made["rows"])
+    page = render_page(config, replace(sensor, min_snr=made["min_snr"]), made["rows"])
     assert page == (DOCS / "unwrapping.md").read_text(encoding="utf-8")
     links = [link for link in re.findall(r"\]\(([^)#]+)\)", page) if "://" not in link]
     assert len(links) >= 5 and all((DOCS / link).exists() for link in links)

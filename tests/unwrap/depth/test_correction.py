@@ -74,7 +74,7 @@ def test_where_the_frequencies_disagree_the_prediction_decides(truth):
 
 
 def test_noise_map_decides_what_is_valid(truth):
-    noise = torch.where(truth < 10, 100.0, 300.0)
+    noise = torch.where(truth < 10, 60.0, 100.0)
     frame = correct(raw_frame(truth, 4), truth.float(), SENSOR, noise_lsb=noise)
     assert torch.equal(frame.valid, truth < 10)
 

@@ -85,6 +85,7 @@ for _ in range(30):
 """
 
 
+@pytest.mark.slow
 def test_training_of_a_narrow_network_leaves_the_heap_in_order():
     # glibc's checking allocator aborts the process at the first spoilt block. Elsewhere the two
     # variables do nothing, but a spoilt heap seldom lasts thirty steps.

@@ -61,10 +61,15 @@ def test_a_fused_network_normalises_nothing_and_leaves_the_network_alone():
     assert all(torch.equal(weights[name], tensor) for name, tensor in network.state_dict().items())
 
 
+EVERYDAY = ("tofregnet", "toffusionnet")
 TRACED = [name for name in PLACES if build_network(name, Settings(width=4)).can_be_traced]
 
 
-@pytest.mark.parametrize("name", TRACED)
+# Each takes two seconds to compile: every day one for gray and one for samples.
+@pytest.mark.parametrize(
+    "name",
+    [name if name in EVERYDAY else pytest.param(name, marks=pytest.mark.slow) for name in TRACED],
+)
 @torch.inference_mode()
 def test_a_compiled_network_computes_the_same(name):
     network = network_of(name)

@@ -213,9 +213,9 @@ def test_the_offset_map_mends_two_samples(correct, tmp_path):
 
 def test_the_noise_decides_what_is_valid(correct, tmp_path):
     np.save(tmp_path / "wall.npy", words_of(wall_m(3.0), 8))
-    correct(tmp_path / "wall.npy", "--noise-lsb", AMPLITUDE_LSB - 2)
+    correct(tmp_path / "wall.npy", "--noise-lsb", (AMPLITUDE_LSB - 2) / 3)
     assert np.load(tmp_path / "out/valid.npy").all()
-    words = ("--noise-lsb", AMPLITUDE_LSB + 2, "--overwrite")
+    words = ("--noise-lsb", (AMPLITUDE_LSB + 2) / 3, "--overwrite")
     assert "no usable pixel" in correct(tmp_path / "wall.npy", *words, status=1)
 
 

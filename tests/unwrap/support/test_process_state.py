@@ -31,6 +31,7 @@ def pages_mapped(how: str) -> int:
     return int(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks the GNU C library")
 def test_freed_memory_is_used_again():
     if pages_mapped("leave") < 1000:

@@ -10,8 +10,8 @@ import mitsuba as mi
 import numpy as np
 
 from shotenv.render.backend import only_where, upload
-from shotenv.render.geometry import REACH_M, Posed, faces_of
-from shotenv.render.texture import noise_texture
+from shotenv.render.surfaces.geometry import REACH_M, Posed, faces_of
+from shotenv.render.surfaces.texture import noise_texture
 from shotenv.world.geometry import World
 
 SURFACE_OFFSET_M = 1e-3
@@ -115,6 +115,12 @@ class Scene:
             clear=rest[3],
             diffuse=1 - rest[2] - rest[3],
         )
+
+    def distance_m(self, origin, direction, instant):
+        """Distance to the nearest surface along each of neighbouring rays; infinite at none."""
+        active = mi.Bool(True)
+        near = self._nearest(origin, direction, mi.Float(REACH_M), instant, active, coherent=True)
+        return dr.select(near.valid, near.distance_m, dr.inf)
 
     def transmission(self, origin, direction, length, instant, active):
         """Share of the light that comes through `length` metres of each ray (at most `REACH_M`).

@@ -1,0 +1,214 @@
+"""Figures of the renderer itself: its own error, and the laser's emission profile."""
+
+from __future__ import annotations
+
+import math
+import statistics
+import time
+
+import mitsuba as mi
+import numpy as np
+import torch
+
+from figures.stage import (
+    BLUE,
+    CAMERA,
+    GRAY,
+    GREEN,
+    INTEGRATION_S,
+    POWER_W,
+    RED,
+    SENSOR,
+    Made,
+    Row,
+    apart_m,
+    axes,
+    label,
+    plate,
+    rays,
+    rendered,
+    wall,
+    world,
+)
+from shotenv.config import CameraConfig, EmissionConfig, WorldConfig
+from shotenv.config.families import FAMILIES, SHIFT_FAMILIES
+from shotenv.render import FrameRenderer, RenderedFrame, stock_path, stock_scene
+from shotenv.sensor import electrons_per_radiance_second
+from shotenv.world import draw_world
+from shotenv.world.geometry.meshes import join
+from unwrap.signal import decode, distance_m, unambiguous_range_m
+
+SEEDS = (3, 14)
+"""Worlds of each family."""
+
+
+def renderer_error() -> Made:
+    """Error between seeds beside the sensor's noise, by family; error over time."""
+    figure, panels = axes("Error in distance, rms", "Laser light in a closed room", widths=(1.4, 1))
+    names = (*FAMILIES, *SHIFT_FAMILIES)
+    found = {name: np.sqrt(np.mean([_errors(name, s) for s in SEEDS], axis=0)) for name in names}
+    place = np.arange(len(names))
+    for column, shift, colour, name in (
+        (1, 0.2, GRAY, "sensor, 4 DCS"),
+        (0, -0.2, BLUE, "renderer"),
+    ):
+        values = [1e3 * found[family][column] for family in names]
+        panels[0].barh(place + shift, values, 0.38, color=colour, label=name)
+    panels[0].set_yticks(place, [name.replace("_", " ") for name in names])
+    panels[0].invert_yaxis()
+    label(panels[0], "mm", "", loc="lower right")
+    _error_over_time(panels[1])
+    rows = [
+        Row(
+            f"renderer's error, {name.replace('_', ' ')}: distance; ambient light, median",
+            f"sensor, 4 DCS: {1e3 * found[name][1]:.0f} mm",
+            f"{1e3 * found[name][0]:.0f} mm; {100 * found[name][2]:.1f} %",
+        )
+        for name in names
+    ]
+    return figure, rows
+
+
+def _errors(family: str, seed: int) -> np.ndarray:
+    """Mean squares of the error in distance (m), of the sensor's noise (m), and of the median error
+    of the ambient light (a share), on smooth surfaces where one sample's SNR is above 5."""
+    renderer = FrameRenderer(draw_world(family, seed, WorldConfig()), SENSOR)
+    one, other = (renderer.frame(0.5, CameraConfig(), seed=number) for number in (100, 101))
+    sigma_m, snr = _sensor_noise_m(one)
+    counted = _smooth(one.distance_m) & (snr > 5)
+    range_m = unambiguous_range_m(SENSOR.f1_hz)
+    apart = apart_m(_measured_m(one), _measured_m(other), range_m)[counted]
+    lit = one.ambient > 0.1 * one.ambient.mean()
+    first, second = (image[lit] for image in (one.ambient, other.ambient))
+    gray = np.median(np.abs(first - second) / (first + second)) * math.sqrt(2)
+    return np.array([(apart**2).mean() / 2, (sigma_m[counted] ** 2).mean(), gray**2])
+
+
+def _measured_m(frame: RenderedFrame) -> np.ndarray:
+    phase = decode(torch.from_numpy(frame.correlation[:4])).phase_rad
+    return distance_m(phase, SENSOR.f1_hz).numpy()
+
+
+def _sensor_noise_m(frame: RenderedFrame) -> tuple[np.ndarray, np.ndarray]:
+    """Standard deviation of the distance of 4 DCS by the sensor, and one sample's SNR."""
+    per_radiance = electrons_per_radiance_second(SENSOR) * INTEGRATION_S
+    signal, ambient = frame.active * per_radiance * POWER_W, frame.ambient * per_radiance
+    noise = np.sqrt(signal + ambient + 2 * SENSOR.read_noise_e**2)
+    snr = SENSOR.contrast * signal / noise
+    per_radian_m = unambiguous_range_m(SENSOR.f1_hz) / (2 * math.pi)
+    return per_radian_m / (math.sqrt(2) * np.maximum(snr, 1e-9)), snr
+
+
+def _smooth(true_m: np.ndarray) -> np.ndarray:
+    """Pixels within 25 m whose four neighbours are as far but for 5 %."""
+    near = np.where(np.isfinite(true_m) & (true_m < 25.0), true_m, 1e9)
+    even = near < 25.0
+    for axis in (0, 1):
+        for step in (1, -1):
+            even &= np.abs(np.roll(near, step, axis) - near) < 0.05 * near
+    even[[0, -1]] = even[:, [0, -1]] = False
+    return even
+
+
+def _room(albedo: float = 0.6):
+    """A closed room of 5 x 4 x 3 m with the camera at its back wall, and a box in it."""
+    sides = [plate((2.4, y, 1.0), (2.6, 0, 0), (0, 0, 1.5), albedo=albedo) for y in (-2.0, 2.0)]
+    sides += [plate((2.4, 0, z), (2.6, 0, 0), (0, 2, 0), albedo=albedo) for z in (-0.5, 2.5)]
+    ends = [plate((x, 0, 1.0), (0, 2, 0), (0, 0, 1.5), albedo=albedo) for x in (-0.2, 5.0)]
+    box = plate((3.0, 0.5, 0.2), (0, 0.6, 0), (0, 0, 0.7), albedo=albedo)
+    return join([*sides, *ends, box])
+
+
+def _error_over_time(panel) -> None:
+    """Relative error of the laser's light over the time it takes, ours and `path`."""
+    from shotenv.render.beam import emitted_sr
+    from shotenv.render.instants import Instants
+    from shotenv.render.integrator import trace
+    from shotenv.render.surfaces import Surroundings
+
+    scene = world(_room())
+    surroundings = Surroundings(scene)
+    once = Instants((0.0,), (True,), (False,), (0,), (0.0,), (0.0,))
+    # A round cone, just wider than the view, which Mitsuba's spot has too.
+    cone = EmissionConfig(profile="table", angle_deg=(0.0, 36.0), intensity=(1.0, 1.0))
+    camera = CAMERA.model_copy(update={"width": 160, "height": 120, "bounces": 2, "emission": cone})
+    spot = {
+        "type": "spot",
+        "to_world": mi.ScalarTransform4f().look_at(
+            origin=[0.0, 0.0, 1.0], target=[1.0, 0.0, 1.0], up=[0.0, 0.0, 1.0]
+        ),
+        "intensity": 1 / emitted_sr(camera),
+        "cutoff_angle": 36.0,
+        "beam_width": 35.99,
+    }
+    stock = stock_scene(scene, 0.0, camera, laser=spot)
+
+    def ours(samples: int, seed: int) -> np.ndarray:
+        one = camera.model_copy(update={"samples_per_pixel": samples})
+        return trace(scene, once, one, seed=seed, surroundings=surroundings).active[0]
+
+    def path(samples: int, seed: int) -> np.ndarray:
+        image = mi.render(stock, integrator=stock_path(camera), spp=samples, seed=seed)
+        return np.array(image)[..., 0]
+
+    for render, counts, colour, name in (
+        (ours, (4, 16, 64), BLUE, "this renderer"),
+        (path, (4, 16, 64, 256), RED, "Mitsuba's path"),
+    ):
+        points = []
+        for samples in counts:
+            render(samples, 0)
+            start = time.perf_counter()
+            images = np.array([render(samples, seed) for seed in range(1, 5)], np.float64)
+            seconds = (time.perf_counter() - start) / 4
+            share = np.sqrt((images.var(axis=0, ddof=1) / images.mean(axis=0) ** 2).mean())
+            points.append((1e3 * seconds, 100 * share))
+        panel.plot(*zip(*points, strict=True), "o-", color=colour, label=name)
+    panel.set(xscale="log", yscale="log")
+    panel.set_ylim(top=300)
+    label(panel, "time of an image, ms", "error, % rms", loc="upper right")
+
+
+def emission() -> Made:
+    """Irradiance of a facing wall across the view, and a closed room's phase over edge softness."""
+    figure, panels = axes("A facing wall, middle row", "A closed room's mean distance, 4 bounces")
+    profiles = {
+        "a knife's edge": (EmissionConfig(edge_softness_deg=0.0), GRAY),
+        "edges of 6° (default)": (EmissionConfig(), BLUE),
+        "edges of 20°": (EmissionConfig(edge_softness_deg=20.0), GREEN),
+        "Gaussian, 60°": (EmissionConfig(profile="gaussian", fwhm_deg=60.0), RED),
+    }
+    camera = CAMERA.model_copy(update={"width": 81, "height": 61})
+    ahead = rays(camera)[30, :, 0]
+    angle = np.degrees(np.arccos(ahead)) * np.sign(np.arange(81) - 40)
+    for name, (profile, colour) in profiles.items():
+        one = camera.model_copy(update={"emission": profile})
+        light = rendered(world(wall(5.0)), one).active[30]
+        # Of the radiance albedo / pi x I x cos^3 / d^2, what the profile is.
+        panels[0].plot(angle, light / ahead**3 * 25 * math.pi / 0.4, color=colour, label=name)
+    panels[0].set_ylim(0, 2.1)
+    label(panels[0], "angle from the axis, degrees", "W/sr per watt", loc="upper center", ncols=2)
+    softness = np.array([0.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0])
+    room, phases = world(_room()), []
+    for degrees in softness:
+        one = CAMERA.model_copy(
+            update={
+                "width": 32,
+                "height": 24,
+                "bounces": 4,
+                "samples_per_pixel": 64,
+                "emission": EmissionConfig(edge_softness_deg=float(degrees)),
+            }
+        )
+        measured = _measured_m(rendered(room, one))
+        phases.append(1e3 * statistics.mean(measured.ravel()))
+    shift = np.array(phases) - phases[0]
+    panels[1].plot(softness, shift, "o-", color=BLUE)
+    label(panels[1], "width of the edges, degrees", "change of distance, mm")
+    return figure, [
+        Row(
+            "closed room, mean distance with edges of 60° less that with a knife's edge",
+            "(none)",
+            f"{shift[-1]:.0f} mm",
+        )
+    ]
