@@ -40,10 +40,12 @@ def outlines(pieces, times):
             ]
         )
         points = ((points - place) @ turn)[(points[:, 2] > KERB_M) & (points[:, 2] < HEAD_M)]
-        (x0, y0), (x1, y1) = (
-            points[:, :2].min(axis=0) + SLACK_M,
-            points[:, :2].max(axis=0) - SLACK_M,
-        )
+        if not len(points):
+            # Too low or too high to be run into: where nothing else could be.
+            result[i] = 1e6
+            continue
+        x0, y0 = points[:, :2].min(axis=0) + SLACK_M
+        x1, y1 = points[:, :2].max(axis=0) - SLACK_M
         ring = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
         result[i] = ring @ turn[:2, :2].T + place[:2]
     return result
