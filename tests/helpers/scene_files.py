@@ -7,10 +7,13 @@ import struct
 from pathlib import Path
 
 import numpy as np
+import pytest
 import trimesh
 
 from shotenv.config.own_scene import OwnSceneConfig, SurfaceConfig
+from shotenv.render.surfaces import SceneFileError
 from shotenv.scenes.bank_config import NOT_READ
+from shotenv.scenes.scene_worlds import read_scene
 
 STRAIGHT = {"poses": [{"time_s": 0.0, "position_m": (0.0, 0.0, 1.0)},
                       {"time_s": 1.0, "position_m": (1.0, 0.0, 1.0)}]}  # fmt: skip
@@ -65,3 +68,10 @@ def edited_glb(path: Path, change) -> Path:
     head = struct.pack("<III", 0x46546C67, 2, 20 + len(text) + len(rest))
     path.write_bytes(head + struct.pack("<II", len(text), 0x4E4F534A) + text + rest)
     return path
+
+
+def refusal(path, **fields) -> str:
+    """What is said when the scene of a file is refused."""
+    with pytest.raises(SceneFileError) as refused:
+        read_scene(scene_config(path, **fields))
+    return str(refused.value)
