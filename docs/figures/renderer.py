@@ -9,6 +9,7 @@ import time
 import mitsuba as mi
 import numpy as np
 import torch
+from matplotlib.ticker import NullFormatter
 
 from figures.stage import (
     BLUE,
@@ -56,6 +57,7 @@ def renderer_error() -> Made:
         panels[0].barh(place + shift, values, 0.38, color=colour, label=name)
     panels[0].set_yticks(place, [name.replace("_", " ") for name in names])
     panels[0].invert_yaxis()
+    panels[0].set_xlim(right=1.6 * max(1e3 * found[name][1] for name in names))
     label(panels[0], "mm", "", loc="lower right")
     _error_over_time(panels[1])
     rows = [
@@ -165,6 +167,8 @@ def _error_over_time(panel) -> None:
             points.append((1e3 * seconds, 100 * share))
         panel.plot(*zip(*points, strict=True), "o-", color=colour, label=name)
     panel.set(xscale="log", yscale="log")
+    # Less than two decades: numbers of their own between them would run into each other.
+    panel.xaxis.set_minor_formatter(NullFormatter())
     panel.set_ylim(top=300)
     label(panel, "time of an image, ms", "error, % rms", loc="upper right")
 
