@@ -20,6 +20,7 @@ import numpy as np
 
 from shotenv.config import CameraConfig
 from shotenv.render.instants import Instants
+from shotenv.render.irradiance_filter import SoftLight, filtered
 from shotenv.render.laser_light import (
     POINTS,
     POINTS_PER_PATH,
@@ -96,8 +97,9 @@ def trace(
     scene = Scene(surroundings, posed(world, surroundings.faces, instants.times_s, camera.bounces))
     sampler = Sampler(lanes, instants, camera, seed=seed)
     points = LitPoints.shone_on(scene, eye, instants, seed) if camera.bounces > 1 else None
-    gathered = _follow(scene, sources, points, lanes, camera.bounces, sampler)
-    return _collect(gathered, _true_distance(scene, eye, len(instants), camera), camera)
+    gathered = _follow(scene, sources, points, lanes, camera, sampler)
+    distance_m = _true_distance(scene, eye, len(instants), camera)
+    return _collect(gathered, distance_m, instants, camera)
 
 
 @dataclass(frozen=True)
@@ -119,6 +121,16 @@ class _Gathered:
     ambient: Any
     active: Any
     correlation: Any
+    soft: Any
+    first: Hit
+
+    def add_ambient(self, radiance, soft=False) -> None:
+        """Add passive light; `soft` is what its filter may average with that of neighbours."""
+        if self.soft is None:
+            self.ambient += radiance
+        else:
+            self.ambient += dr.select(soft, 0, radiance)
+            self.soft += dr.select(soft, radiance, 0)
 
     def add_active(self, radiance, path_m) -> None:
         """Add laser light that came a way of `path_m` metres."""
@@ -185,14 +197,14 @@ def _follow(
     sources: _Sources,
     points: LitPoints | None,
     lanes: Lanes,
-    bounces: int,
+    camera: CameraConfig,
     sampler: Sampler,
 ) -> _Gathered:
     """Walk every lane's path from the camera, adding the light of each surface hit.
 
     `points` are needed where paths have more than one surface.
     """
-    passive, instant = sources.passive, lanes.instant
+    passive, instant, bounces = sources.passive, lanes.instant, camera.bounces
     eye = sources.eye
     place, *further = sampler.in_pixel(VIEW_RAYS)
     origin, direction = eye.rays(lanes, place)
@@ -203,6 +215,8 @@ def _follow(
         ambient=dr.select(sources.passive_on & ~hit.valid, passive.sky(direction), 0),
         active=mi.Float(0),
         correlation=mi.Float(0),
+        soft=mi.Float(0) if camera.gray_filter_m else None,
+        first=hit,
     )
     for place in further:
         _add_first_return(light, scene, sources, lanes, place, share)
@@ -212,6 +226,8 @@ def _follow(
     # by another way than the camera looks. `seeks_sky`: a ray that meets nothing sees the sky,
     # which no aimed ray has counted already.
     way_back, bent, seeks_sky = mi.Float(1), mi.Bool(False), sources.passive_on
+    # Whether the first surface has scattered: what comes then changes little between pixels.
+    soft = mi.Bool(False)
     # Density of having scattered to the surface, per its area: of the laser's two ways to it one.
     found = mi.Float(dr.inf)
     # A Python loop: each bounce is traced into the one kernel, which knows the first and the last.
@@ -237,7 +253,7 @@ def _follow(
         # Faces of lamps glow for the camera and its mirrors alone: what they shine on others is
         # the `Lamp`'s, and would be counted twice.
         glow = dr.select(passive_on & (way_back > 0), hit.emission, 0)
-        light.ambient += throughput * glow
+        light.add_ambient(throughput * glow)
 
         # Every lane draws all numbers at each surface, used or not, so that lanes stay in step.
         aim, which = sampler.next_2d(), sampler.next_1d()
@@ -248,11 +264,14 @@ def _follow(
             sky = passive.sky_irradiance(
                 scene, hit, instant, sampler.next_points(SKY_RAYS), passive_on & aimed
             )
-            light.ambient += sky * hit.diffuse * hit.albedo * dr.inv_pi
+            light.add_ambient(sky * hit.diffuse * hit.albedo * dr.inv_pi, soft=True)
         numbers = aim, which, onward.number
         irradiance = passive.irradiance(scene, hit, instant, numbers, passive_on)
         # The surface reflects to the camera whatever way the path goes on.
-        light.ambient += throughput * irradiance * hit.diffuse * hit.albedo * dr.inv_pi
+        direct = throughput * irradiance * hit.diffuse * hit.albedo * dr.inv_pi
+        light.add_ambient(direct, soft)
+        if bounce == 0:
+            soft = onward.scatters
         throughput *= onward.kept
         seeks_sky = passive_on & dr.select(
             onward.scatters,
@@ -275,7 +294,7 @@ def _follow(
             # Nothing is seen of a surface beyond the last bounce: whether the sky is, is enough.
             reach = mi.Float(REACH_M)
             free = scene.transmission(onward.start, direction, reach, instant, seeks_sky)
-        light.ambient += throughput * passive.sky(direction) * free
+        light.add_ambient(throughput * passive.sky(direction) * free, soft)
     return light
 
 
@@ -297,12 +316,15 @@ def _true_distance(scene: Scene, eye: Pinhole, instants: int, camera: CameraConf
     return scene.distance_m(origin, direction, lanes.instant)
 
 
-def _collect(light: _Gathered, distance_m: Any, camera: CameraConfig) -> Traced:
+def _collect(
+    light: _Gathered, distance_m: Any, instants: Instants, camera: CameraConfig
+) -> Traced:
     """Mean over the samples of each pixel."""
     samples = camera.samples_per_pixel
     first = dr.arange(mi.UInt32, len(distance_m)) * samples
+    soft = None if light.soft is None else SoftLight.of(light.soft, light.first)
     # The launch; the sums read other lanes, and so make a second, small kernel.
-    dr.eval(distance_m, light.ambient, light.active, light.correlation)
+    dr.eval(distance_m, light.ambient, light.active, light.correlation, soft)
     images = [
         distance_m,
         *(
@@ -312,7 +334,11 @@ def _collect(light: _Gathered, distance_m: Any, camera: CameraConfig) -> Traced:
     ]
     dr.eval(images)
     shape = (-1, camera.height, camera.width)
-    return Traced(*(image.numpy().reshape(shape) for image in images))
+    traced = Traced(*(image.numpy().reshape(shape) for image in images))
+    passive = np.flatnonzero(instants.passive)
+    if soft is not None and len(passive):
+        traced.ambient[passive] += filtered(soft, passive, camera)
+    return traced
 
 
 def _sum(values, first, count: int):
