@@ -30,7 +30,7 @@ class CameraConfig(Section):
     gray_instants: int = Field(4, ge=1, le=16, description="instants that make the gray image")
     bounces: int = Field(2, ge=1, le=8, description="surface hits of a light path")
     gray_filter_m: NonNegative = Field(
-        0.15, description="reach of the gray light's filter along a plane, m; 0 filters nothing"
+        0.3, description="reach of the gray light's filter along a plane, m; 0 filters nothing"
     )
     emission: EmissionConfig = EmissionConfig()
 

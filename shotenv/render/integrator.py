@@ -260,15 +260,15 @@ def _follow(
         number, sample = sampler.next_choice(), sampler.next_2d()
         onward = _Onward.drawn(hit, direction, number, sample)
         if bounce == 0:
-            aimed = ~passive.sky_is_aimed_at(hit)
-            sky = passive.sky_irradiance(
-                scene, hit, instant, sampler.next_points(SKY_RAYS), passive_on & aimed
-            )
+            sky_points = sampler.next_points(SKY_RAYS)
+            sky = passive.sky_irradiance(scene, hit, instant, sky_points, passive_on)
             light.add_ambient(sky * hit.diffuse * hit.albedo * dr.inv_pi, soft=True)
-        numbers = aim, which, onward.number
-        irradiance = passive.irradiance(scene, hit, instant, numbers, passive_on)
+            daylight = passive.sun_irradiance(scene, hit, instant, passive_on)
+        else:
+            daylight = passive.daylight(scene, hit, instant, aim, which, passive_on)
+        lamps = passive.lamps(scene, hit, instant, onward.number, passive_on)
         # The surface reflects to the camera whatever way the path goes on.
-        direct = throughput * irradiance * hit.diffuse * hit.albedo * dr.inv_pi
+        direct = throughput * (daylight + lamps) * hit.diffuse * hit.albedo * dr.inv_pi
         light.add_ambient(direct, soft)
         if bounce == 0:
             soft = onward.scatters
@@ -316,9 +316,7 @@ def _true_distance(scene: Scene, eye: Pinhole, instants: int, camera: CameraConf
     return scene.distance_m(origin, direction, lanes.instant)
 
 
-def _collect(
-    light: _Gathered, distance_m: Any, instants: Instants, camera: CameraConfig
-) -> Traced:
+def _collect(light: _Gathered, distance_m: Any, instants: Instants, camera: CameraConfig) -> Traced:
     """Mean over the samples of each pixel."""
     samples = camera.samples_per_pixel
     first = dr.arange(mi.UInt32, len(distance_m)) * samples

@@ -17,7 +17,7 @@ import numpy as np
 from shotenv.config import CameraConfig
 from shotenv.render.surfaces import Hit
 
-REACH_PX = 2
+REACH_PX = 3
 """Farthest neighbours, in rows and in columns."""
 PLANE_M = 0.01
 """Largest distance of a point from the plane of another."""
@@ -63,14 +63,14 @@ class _Pixels:
         for lane in (first + sample for sample in range(samples)):
             radiance += dr.gather(mi.Float, soft.radiance, lane)
             reflects += dr.gather(mi.Float, soft.reflectance, lane)
-            plane &= _in_plane(normal, point, _vectors(soft.normal, lane), _vectors(soft.point, lane))
+            plane &= _in_plane(
+                normal, point, _vectors(soft.normal, lane), _vectors(soft.point, lane)
+            )
         # Of what is not hit, normals are zero, so that it has no plane.
         return cls(radiance / samples, reflects / samples, normal, point, plane)
 
 
-def filtered(
-    soft: SoftLight, instants: np.ndarray, camera: CameraConfig
-) -> np.ndarray:
+def filtered(soft: SoftLight, instants: np.ndarray, camera: CameraConfig) -> np.ndarray:
     """Mean radiance of each pixel, float32 [N, H, W], at N of the rendered `instants`.
 
     The pixel's reflectance times the irradiance over its neighbours: those within `REACH_PX`
