@@ -79,14 +79,15 @@ class PassiveLight:
         """
         frame, total, aimed = mi.Frame3f(hit.normal), mi.Float(0), self.sky_is_aimed_at(hit)
         for point in points:
-            direction = frame.to_world(mi.warp.square_to_cosine_hemisphere(point))
+            scattered = frame.to_world(mi.warp.square_to_cosine_hemisphere(point))
             inward, solid_angle = self._opening.aim(hit.point, point)
-            direction = dr.select(aimed, inward, direction)
-            weight = dr.select(aimed, self._share_aimed(hit, inward, solid_angle), dr.pi)
-            lit = active & (weight > 0)
-            free = scene.transmission(hit.leave, direction, mi.Float(REACH_M), instant, lit)
-            total += self.sky(direction) * weight * free
-        return total * (1 / len(points))
+            direction = dr.select(aimed, inward, scattered)
+            # What a ray stands for, by what all directions above the surface do.
+            share = dr.select(aimed, _projected(hit, inward, solid_angle) * dr.inv_pi, 1)
+            seeks = active & (share > 0)
+            free = scene.transmission(hit.leave, direction, mi.Float(REACH_M), instant, seeks)
+            total += self.sky(direction) * share * free
+        return total * (dr.pi / len(points))
 
     def sun_irradiance(self, scene: Scene, hit: Hit, instant, active):
         """Irradiance of the sun on a surface, with its shadow, W m-2."""
@@ -102,8 +103,8 @@ class PassiveLight:
         sky is drawn in proportion to their unshadowed irradiance.
         """
         direction, solid_angle = self._opening.aim(hit.point, aim)
-        weight = self._share_aimed(hit, direction, solid_angle)
-        sky = dr.select(self.sky_is_aimed_at(hit), self.sky(direction) * weight, 0)
+        sky = self.sky(direction) * _projected(hit, direction, solid_angle)
+        sky = dr.select(self.sky_is_aimed_at(hit), sky, 0)
         choice = _Choice(sky, direction, mi.Float(REACH_M), number)
         sun = self._unshadowed_sun(hit)
         choice = choice.offer(sun, self._sun_direction, mi.Float(REACH_M))
@@ -114,12 +115,6 @@ class PassiveLight:
     def _unshadowed_sun(self, hit: Hit):
         sun = self._sun_irradiance * dr.maximum(dr.dot(hit.normal, self._sun_direction), 0)
         return dr.select(self._opening.lets_in(hit.point, self._sun_direction), sun, 0)
-
-    @staticmethod
-    def _share_aimed(hit: Hit, direction, solid_angle):
-        """Irradiance by radiance of a part of the opening: none comes from below the horizon."""
-        cosine = dr.maximum(dr.dot(hit.normal, direction), 0)
-        return dr.select(direction.z > 0, cosine * solid_angle, 0)
 
     def sky_is_aimed_at(self, hit: Hit):
         """Whether `daylight` holds the sky's light on this surface already."""
@@ -203,6 +198,12 @@ class _Opening:
         through = (crossing.y > self._from.y) & (crossing.y < self._to.y)
         through &= (crossing.z > self._from.z) & (crossing.z < self._to.z)
         return ~self._is_indoors(point) | (through & (direction.x > 0))
+
+
+def _projected(hit: Hit, direction, solid_angle):
+    """Irradiance by radiance of a part of the sky; none is below the horizon."""
+    cosine = dr.maximum(dr.dot(hit.normal, direction), 0)
+    return dr.select(direction.z > 0, cosine * solid_angle, 0)
 
 
 def _opaque_point(numbers):
