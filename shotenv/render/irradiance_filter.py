@@ -15,6 +15,7 @@ import mitsuba as mi
 import numpy as np
 
 from shotenv.config import CameraConfig
+from shotenv.render.sampling import pixel_sums
 from shotenv.render.surfaces import Hit
 
 REACH_PX = 3
@@ -59,15 +60,17 @@ class _Pixels:
     @classmethod
     def of(cls, soft: SoftLight, first, samples: int) -> _Pixels:
         normal, point = _vectors(soft.normal, first), _vectors(soft.point, first)
-        radiance, reflects, plane = mi.Float(0), mi.Float(0), mi.Bool(True)
-        for lane in (first + sample for sample in range(samples)):
-            radiance += dr.gather(mi.Float, soft.radiance, lane)
-            reflects += dr.gather(mi.Float, soft.reflectance, lane)
-            plane &= _in_plane(
-                normal, point, _vectors(soft.normal, lane), _vectors(soft.point, lane)
-            )
-        # Of what is not hit, normals are zero, so that it has no plane.
-        return cls(radiance / samples, reflects / samples, normal, point, plane)
+        plane = mi.Bool(True)
+        for sample in range(1, samples):
+            own_normal, own_point = (_vectors(v, first + sample) for v in (soft.normal, soft.point))
+            plane &= _in_plane(normal, point, own_normal, own_point)
+        # A lone sample is in its plane, but where nothing is hit its normal is zero.
+        plane &= dr.squared_norm(normal) > 0
+        radiance, reflectance = (
+            pixel_sums(values, first, samples) / samples
+            for values in (soft.radiance, soft.reflectance)
+        )
+        return cls(radiance, reflectance, normal, point, plane)
 
 
 def filtered(soft: SoftLight, instants: np.ndarray, camera: CameraConfig) -> np.ndarray:
