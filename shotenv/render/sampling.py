@@ -38,11 +38,11 @@ class Lanes:
 
 
 def pixel_sums(values, first, count: int):
-    """Sums of `count` lanes from each of `first` on.
+    """Sums of `count` lanes from each of `first` on, halves on halves.
 
-    Halves on halves: what `dr.block_sum` gives, but sooner. On two cores, three sums of 12 instants of 160 x 120 pixels and 4 samples take 0.2 ms, against
-    14 ms by `dr.block_sum`. Of 4 samples both give the same to the last bit, down to the sign of
-    zero.
+    What `dr.block_sum` gives, but sooner: on two cores, three sums of 12 instants of 160 x 120
+    pixels and 4 samples take 0.2 ms, against 14 ms. Of 4 samples both give the same to the last
+    bit, down to the sign of zero.
     """
     parts = [dr.gather(mi.Float, values, first + i) for i in range(count)]
     while len(parts) > 1:
