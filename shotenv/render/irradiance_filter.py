@@ -82,7 +82,8 @@ def filtered(soft: SoftLight, instants: np.ndarray, camera: CameraConfig) -> np.
     height, width, samples = camera.height, camera.width, camera.samples_per_pixel
     count = height * width
     place = dr.arange(mi.UInt32, len(instants) * count)
-    instant = dr.gather(mi.UInt32, mi.UInt32(instants), place // count)
+    # From a list: NumPy's memory would be borrowed, and its alignment makes another kernel.
+    instant = dr.gather(mi.UInt32, mi.UInt32(instants.tolist()), place // count)
     first = (instant * count + place % count) * samples
     pixels = _Pixels.of(soft, first, samples)
     dr.eval(pixels)
