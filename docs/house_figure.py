@@ -75,6 +75,7 @@ PLACES = {
     "shotenv.world.geometry": Box(40, 168, 420, 446),
     "shotenv.scenes": Box(186, 312, 580, BACK[1]),
     "shotenv.render": Box(186, 312, FRONT[0], 573),
+    "shotenv.render.surfaces": Box(196, 302, 452, 478),
     "shotenv.render.backend": Box(196, 302, 420, 446),
     "shotenv.bank": Box(320, 456, *BACK),
     "shotenv.sensor": Box(320, 456, *FRONT),

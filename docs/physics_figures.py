@@ -15,7 +15,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import torch
-from figures import decoding, laser, light, renderer, sensor, stray_light
+from figures import decoding, laser, light, movers, renderer, sensor, stray_light
 from figures.stage import Made, Row
 
 DOCS = Path(__file__).parent
@@ -28,6 +28,7 @@ FIGURES: tuple[Callable[[], Made], ...] = (
     renderer.emission,
     light.panes,
     light.motion,
+    movers.movers,
     renderer.renderer_error,
     stray_light.stray_light,
     sensor.photon_transfer,
@@ -36,6 +37,7 @@ FIGURES: tuple[Callable[[], Made], ...] = (
     sensor.offsets,
     sensor.temperature,
     sensor.gray,
+    decoding.valid,
     decoding.dual,
     laser.laser_energy,
     laser.laser_curves,

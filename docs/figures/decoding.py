@@ -153,3 +153,31 @@ def wrong_share(sigma_m: float) -> float:
     above, below = min(others), range2_m - max(others)
     tails = (0.5 * math.erfc(gap / 2 / sigma_m / math.sqrt(2)) for gap in (above, below))
     return sum(tails)
+
+
+def valid() -> Made:
+    """How often noise alone is called valid, by the threshold on the decoded amplitude."""
+    figure, (panel,) = axes("Noise alone called valid")
+    thresholds = np.linspace(0.0, 4.0, 17)
+    generator = torch.Generator().manual_seed(0)
+    rows = []
+    for samples, colour in ((2, RED), (4, BLUE)):
+        noise = torch.randn(1, samples, 1000, 1000, generator=generator)
+        amplitude = decode(noise).amplitude
+        found = [float((amplitude >= k).double().mean()) for k in thresholds]
+        # The amplitude of two normals is Rayleigh's; four samples halve its variance.
+        expected = np.exp(-(thresholds**2) / (2 if samples == 2 else 1))
+        panel.plot(thresholds, expected, color=colour, label=f"{samples} DCS")
+        panel.plot(thresholds, found, "o", color=colour, markersize=3)
+        at = int(np.flatnonzero(thresholds == 2.0)[0])
+        rows.append(
+            Row(
+                f"noise alone at 2 times the noise of a sample, {samples} DCS",
+                f"{expected[at]:.4f}",
+                f"{found[at]:.4f}",
+            )
+        )
+    panel.axvline(SENSOR.min_snr, color=GRAY, linewidth=1, label="default")
+    panel.set(yscale="log", ylim=(1e-6, 1.3))
+    label(panel, "amplitude over the noise of one sample", "share of pixels", loc="lower left")
+    return figure, rows

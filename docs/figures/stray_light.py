@@ -18,7 +18,7 @@ WALL_M, SHEET_M, BRIGHTER = 5.0, 3.5, 300.0
 def stray_light() -> Made:
     """Error of distance around a retro-reflecting sheet, and of a dark wall by a near object."""
     figure, (left, right) = axes(
-        "Error around a sheet, 1 % glare", "Wall at 5 m beside half an image at 3.5 m"
+        "Error around a sheet, 1 % glare", "Wall at 5 m beside one at 3.5 m"
     )
     light = np.full((HEIGHT, WIDTH), np.exp(1j * WALL_M / PER_RADIAN_M))
     light[30:50, 30:60] = BRIGHTER * np.exp(1j * SHEET_M / PER_RADIAN_M)
@@ -52,7 +52,7 @@ def stray_light() -> Made:
                 )
             )
     right.set(xscale="log", yscale="log")
-    label(right, "light of the near half over that of the wall", "measured too near by, m")
+    label(right, "light of the near one over the far one's", "measured too near by, m")
     return figure, rows
 
 

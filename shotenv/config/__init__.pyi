@@ -1,4 +1,9 @@
-from .bank import BankConfig as BankConfig, CameraConfig as CameraConfig, WorldConfig as WorldConfig
+from .bank import (
+    HIGHEST_SPEED_M_S as HIGHEST_SPEED_M_S,
+    BankConfig as BankConfig,
+    CameraConfig as CameraConfig,
+    WorldConfig as WorldConfig,
+)
 from .emission import EmissionConfig as EmissionConfig
 from .env import EnvConfig as EnvConfig, RewardConfig as RewardConfig
 from .families import (

@@ -19,6 +19,9 @@ from shotenv.config.own_scene import OwnSceneConfig
 from shotenv.config.sensor import SensorConfig
 from unwrap.support import NonNegative, Positive, Range, Section, check_range
 
+HIGHEST_SPEED_M_S = 60.0
+"""Of the ego: faster than any car that a sensor of 25 m would be put on."""
+
 
 class CameraConfig(Section):
     """Image geometry, the laser beside the lens, and the instants that are rendered."""
@@ -52,7 +55,9 @@ class WorldConfig(Section):
     """Which worlds are drawn and how a clip moves through them."""
 
     families: tuple[Family, ...] = Field(FAMILIES, min_length=1, description="scene families")
-    speed_m_s: Range = Field((0.0, 15.0), description="ego speed, m/s")
+    speed_m_s: Range = Field(
+        (0.0, 15.0), description="ego speed, m/s; it stands and reverses only if the first is 0"
+    )
     frame_rate_hz: Positive = Field(10.0, description="frames per second of a clip")
     frames_per_clip: int = Field(16, ge=1, le=4096, description="frames of one clip")
     mounts: tuple[MountConfig, ...] = Field(
@@ -62,6 +67,11 @@ class WorldConfig(Section):
     @model_validator(mode="after")
     def _consistent(self) -> WorldConfig:
         check_range("speed_m_s", self.speed_m_s)
+        low, high = self.speed_m_s
+        if low < 0 or high > HIGHEST_SPEED_M_S:
+            raise ValueError(
+                f"speed_m_s is ({low:g}, {high:g}); expected speeds from 0 to {HIGHEST_SPEED_M_S:g}"
+            )
         names = [mount.name for mount in self.mounts]
         if len(set(names)) < len(names):
             raise ValueError(f"mounts are named {', '.join(names)}; expected each name once")

@@ -135,11 +135,13 @@ def draw_drive(
 
 
 def chain_clips(clips: Sequence[Clip], length: int, *, generator: torch.Generator) -> Tensor:
-    """Bank frames int64 [length] of randomly chosen clips, each played from start to end.
+    """Bank frames int64 [length] of randomly chosen clips, each played to its end.
 
-    The next clip is of the same family with probability `FAMILY_STAYS`, else of any; no clip
-    follows itself where there is a choice.
+    The first clip begins at any of its frames, so that drives meet their cuts at different steps;
+    those that follow are played from their start. The next clip is of the same family with
+    probability `FAMILY_STAYS`, else of any; no clip follows itself where there is a choice.
     """
+    begin = float(torch.rand((), dtype=torch.float64, generator=generator))
     frames: list[int] = []
     last: Clip | None = None
     while len(frames) < length:
@@ -148,9 +150,11 @@ def chain_clips(clips: Sequence[Clip], length: int, *, generator: torch.Generato
         others = [clip for clip in clips if clip is not last] or list(clips)
         same_family = [clip for clip in others if last and clip.family == last.family]
         pool = same_family if same_family and stays < FAMILY_STAYS else others
+        first = last is None
         last = pool[int(choice * len(pool))]
         # The last clip is cut off where the drive ends.
-        frames.extend(range(last.start, last.start + last.frames))
+        skipped = int(begin * last.frames) if first else 0
+        frames.extend(range(last.start + skipped, last.start + last.frames))
     return torch.tensor(frames[:length])
 
 

@@ -1,4 +1,4 @@
-"""Worlds to noise-free light: the only room that imports Mitsuba, and not before it must.
+"""Worlds to light: the only room that imports Mitsuba.
 
 From the sensor inwards: `frame.py` gives what the sensor needs of one frame, `instants.py` says
 when light is gathered for it, `lens.py` strays some of it. `integrator.py` walks the light paths,

@@ -7,6 +7,7 @@ indoors those rays would hardly ever find the sky, so the sun's ray aims at the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +22,10 @@ from shotenv.world.geometry import MAX_LAMPS, Indoor, Lamp, World, rotation
 
 _LAMP_NUMBERS = 12
 """Numbers of a lamp: three packets of four, as they are gathered."""
+AHEAD_M = 6.0
+"""How far ahead of the camera lamps light most of what it sees; assumed."""
+FADING_SHARE = 0.15
+"""Share of the distance to the first lamp that is left out, over which lamps are dimmed."""
 
 
 @dataclass(frozen=True)
@@ -55,12 +60,13 @@ class PassiveLight:
     """Sun, sky and lamps of a world at each instant, on the device."""
 
     def __init__(self, world: World, instants: Instants):
-        light = world.light
+        # Daylight changes little within a frame: one number for all of its instants.
+        light = world.light.at(instants.times_s[0])
         # Numbers are made opaque: Dr.Jit would compile a plain one into the kernel as a constant,
         # and every world would wait for a kernel of its own.
         self._lamps = upload(np.stack([lamp_table(world, t) for t in instants.times_s]))
-        self._lamp_count = dr.opaque(mi.UInt32, len(light.lamps))
-        self._opening = _Opening(light.indoor)
+        self._lamp_count = dr.opaque(mi.UInt32, min(len(light.lamps), MAX_LAMPS))
+        self._opening = _Openings(light.indoor)
         self._sun_irradiance = dr.opaque(mi.Float, light.sun_irradiance)
         self._sun_direction = mi.Vector3f(
             [dr.opaque(mi.Float, number) for number in light.sun_direction]
@@ -160,44 +166,74 @@ class PassiveLight:
         return irradiance, direction, dr.maximum(distance - radius, 0)
 
 
-class _Opening:
-    """Where daylight enters a roofed box: a rectangle in the plane of the box's far end.
+class _Openings:
+    """Where daylight enters a roofed box: a rectangle in the plane of its far end, one in its near.
 
-    Without a box nothing is indoors; without an opening its area is 0, and it lets in nothing.
+    Without a box nothing is indoors; an opening that is not there has no area and lets in nothing.
     """
 
     def __init__(self, indoor: Indoor | None):
         low, high = (indoor.low, indoor.high) if indoor else ((1.0,) * 3, (0.0,) * 3)
-        corners = (indoor and indoor.opening) or ((0.0, 0.0), (0.0, 0.0))
         self._low, self._high = _opaque_point(low), _opaque_point(high)
-        self._from, self._to = (_opaque_point((high[0], *corner)) for corner in corners)
-        self._size = self._to - self._from
-        self._area = self._size.y * self._size.z
+        self._far = _Rectangle(high[0], indoor and indoor.opening)
+        self._near = _Rectangle(low[0], indoor and indoor.entrance)
 
     def _is_indoors(self, point):
         return dr.all(point > self._low) & dr.all(point < self._high)
 
     def is_far(self, point):
-        """Whether a point is indoors, and so far in that rays at random would miss the opening."""
-        centre = self._from + self._size * 0.5
-        return self._is_indoors(point) & (self._area < dr.squared_norm(centre - point))
+        """Whether a point is indoors, and so far in that rays at random would miss the openings."""
+        wide = dr.maximum(self._far.solid_angle(point), self._near.solid_angle(point))
+        return self._is_indoors(point) & (wide < 1)
 
     def aim(self, point, sample):
-        """Direction to a point of the opening drawn evenly, and the solid angle it stands for."""
-        target = self._from + self._size * mi.Vector3f(0, sample.x, sample.y)
-        away = target - point
+        """Direction to a point of an opening drawn evenly, and the solid angle it stands for."""
+        far, near = self._far.solid_angle(point), self._near.solid_angle(point)
+        # The wider one is drawn more often; the random number is stretched back to [0, 1).
+        share = dr.select(far + near > 0, far / (far + near), 1)
+        ahead = sample.x < share
+        stretched = dr.select(ahead, sample.x / share, (sample.x - share) / (1 - share))
+        sample = mi.Point2f(stretched, sample.y)
+        away = dr.select(ahead, self._far.at(sample), self._near.at(sample)) - point
         # Points in the opening itself would divide by zero.
         square = dr.maximum(dr.squared_norm(away), 1e-6)
         direction = away * dr.rsqrt(square)
-        return direction, self._area * dr.maximum(direction.x, 0) / square
+        facing = dr.maximum(dr.select(ahead, direction.x, -direction.x), 0)
+        area = dr.select(ahead, self._far.area / share, self._near.area / (1 - share))
+        return direction, area * facing / square
 
     def lets_in(self, point, direction):
-        """Whether a point is outdoors, or a ray from it in this direction leaves by the opening."""
+        """Whether a point is outdoors, or a ray from it in this direction leaves by an opening."""
+        out = (self._far.is_met(point, direction) & (direction.x > 0)) | (
+            self._near.is_met(point, direction) & (direction.x < 0)
+        )
+        return ~self._is_indoors(point) | out
+
+
+class _Rectangle:
+    """A rectangle across x; (lower, upper) corner (y, z), or None for one without area."""
+
+    def __init__(self, x: float, corners: Any):
+        low, high = corners or ((0.0, 0.0), (0.0, 0.0))
+        self._from, self._to = _opaque_point((x, *low)), _opaque_point((x, *high))
+        self._size = self._to - self._from
+        self.area = self._size.y * self._size.z
+
+    def at(self, sample):
+        """Its point at two shares of its sides."""
+        return self._from + self._size * mi.Vector3f(0, sample.x, sample.y)
+
+    def solid_angle(self, point):
+        """About how wide it looks from a point: area over the square of the distance."""
+        away = self._from + self._size * 0.5 - point
+        return self.area / dr.maximum(dr.squared_norm(away), 1e-6)
+
+    def is_met(self, point, direction):
+        """Whether the line through a point in a direction crosses it."""
         # Rays along the wall divide by 0: they cross at infinity or NaN, and neither is inside.
         crossing = point + (self._from.x - point.x) / direction.x * direction
-        through = (crossing.y > self._from.y) & (crossing.y < self._to.y)
-        through &= (crossing.z > self._from.z) & (crossing.z < self._to.z)
-        return ~self._is_indoors(point) | (through & (direction.x > 0))
+        inside = (crossing.y > self._from.y) & (crossing.y < self._to.y)
+        return inside & (crossing.z > self._from.z) & (crossing.z < self._to.z)
 
 
 def _projected(hit: Hit, direction, solid_angle):
@@ -220,17 +256,38 @@ def spot_falloff(cos_axis, cutoff_cos):
 def lamp_table(world: World, time_s: float) -> np.ndarray:
     """Rows [MAX_LAMPS, 12]: position, intensity, axis, cutoff cosine, radius, zeros.
 
-    Lamps that ride with the camera or are carried have moved rigidly with it since time 0.
+    Lamps that ride with the camera or are carried have moved rigidly with it since time 0. Of more
+    lamps than rows, those nearest to what the camera sees shine, the last of them dimmed the more,
+    the nearer the first one that is left out: in a long drive none comes on at once.
     """
     # Rows of lamps that are not there stay 0; the loop over lamps stops before them.
     table = np.zeros((MAX_LAMPS, _LAMP_NUMBERS), np.float32)
-    for row, lamp in zip(table, world.light.lamps, strict=False):
-        turn, position = _lamp_pose(world, lamp, time_s)
+    lamps = [(lamp, *_lamp_pose(world, lamp, time_s)) for lamp in world.light.lamps]
+    dimmed = nearest_lamps(world, [place for *_, place in lamps], time_s)
+    for row, (index, share) in zip(table, dimmed, strict=False):
+        lamp, turn, position = lamps[index]
         axis = turn @ lamp.direction
-        row[:3], row[3] = position, lamp.intensity_w_sr
+        row[:3], row[3] = position, share * lamp.share_on(time_s) * lamp.intensity_w_sr
         row[4:7], row[7] = axis / np.linalg.norm(axis), lamp.cutoff_cos
         row[8] = lamp.radius_m
     return table
+
+
+def nearest_lamps(
+    world: World, places: Sequence[np.ndarray], time_s: float
+) -> list[tuple[int, float]]:
+    """Numbers of the at most `MAX_LAMPS` lamps that shine, nearest first, and by which share."""
+    if len(places) <= MAX_LAMPS:
+        return [(index, 1.0) for index in range(len(places))]
+    camera = world.ego.at(time_s)
+    # The camera looks ahead: lamps a little before it light more of what it sees.
+    seen = np.add(camera.position_m, rotation(camera) @ (AHEAD_M, 0.0, 0.0))
+    away = np.linalg.norm(np.array(places) - seen, axis=1)
+    away[[lamp.rides for lamp in world.light.lamps]] = 0.0
+    order = np.argsort(away, kind="stable")
+    limit = away[order[MAX_LAMPS]]
+    share = np.clip((limit - away) / (FADING_SHARE * limit), 0.0, 1.0)
+    return [(int(index), float(share[index])) for index in order[:MAX_LAMPS]]
 
 
 def _lamp_pose(world: World, lamp: Lamp, time_s: float) -> tuple[np.ndarray, np.ndarray]:

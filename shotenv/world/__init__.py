@@ -11,7 +11,9 @@ What goes where, for who adds something:
 - a **lamp**: a thing with a glowing face (`Material.glowing`) and a `Lamp` at the same place in
   `Site.lamps`, as `put_street_lamps` in `families/traffic.py` does; the sun's and sky's light, and
   the ego's own head lights, are drawn in `geometry/lights.py`;
-- what **weather** does to surfaces: `geometry/weather.py`.
+- what **weather** does to surfaces: `geometry/weather.py`;
+- how the **ego** drives, and how roads bend: `ego.py`. Layouts are told along a straight road, x
+  along it and y across; `Site` bends them when all is placed.
 
 Every draw takes its numbers from one generator in a fixed order, so that a family and a seed give
 the same world on every machine; whatever is added to a family gives it other worlds, and other

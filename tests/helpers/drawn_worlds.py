@@ -34,3 +34,16 @@ def arrays_of(mesh):
 def plain_box(size=(1.0, 1.0, 1.0)) -> Mesh:
     """A box of one plain material, standing on the origin."""
     return meshes.box(size, m.Material(0.2, 0.3))
+
+
+def route_of(motion):
+    """What a piece is hinged to in the end: its mover's way along the ground."""
+    return route_of(motion.body) if hasattr(motion, "body") else motion
+
+
+def movers_of(world):
+    """The moving pieces of a world, gathered by the thing that they belong to."""
+    movers = {}
+    for piece in world.moving:
+        movers.setdefault(id(route_of(piece.motion)), []).append(piece)
+    return list(movers.values())

@@ -1,1 +1,1 @@
-from .settings import SETTINGS as SETTINGS
+from .settings import SETTINGS as SETTINGS, Place as Place

@@ -21,7 +21,9 @@ from shotenv.world.geometry import (
     Lamp,
     Material,
     Mesh,
+    Mover,
     Pose,
+    Rigid,
     Site,
     lights,
     materials as m,
@@ -162,7 +164,7 @@ def hang(site: Site, rng: np.random.Generator, reach_m: float, ceiling_m: float)
 
 def put_mover(site: Site, rng: np.random.Generator, reach_m: float) -> None:
     """Something that goes anywhere at any speed, or nothing where no way is free."""
-    thing = any_thing(rng, reach_m)
+    thing = Mover((Rigid(any_thing(rng, reach_m)),))
     for _ in range(MOVER_TRIES):
         start = Pose((*any_place(site, rng, reach_m), 0.0), rng.uniform(-np.pi, np.pi))
         # Slower where there is less room to go.

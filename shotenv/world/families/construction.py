@@ -7,9 +7,19 @@ from itertools import pairwise
 import numpy as np
 
 from shotenv.world.families.roads import BEHIND_M, REACH_M, build_puddles
-from shotenv.world.families.traffic import TRIES, draw_one, put_row
-from shotenv.world.geometry import Arc, Lamp, Mesh, Pose, Site, lights, materials as m, meshes
-from shotenv.world.things import people, wheel
+from shotenv.world.families.traffic import TRIES, draw_one, put_driver, put_row, strolling
+from shotenv.world.geometry import (
+    Lamp,
+    Mesh,
+    Mover,
+    Pose,
+    Rigid,
+    Site,
+    lights,
+    materials as m,
+    meshes,
+)
+from shotenv.world.things import axle, people
 
 FLOOD_IRRADIANCE = (5e-3, 5e-2)
 """Irradiance in band of a flood light, at a distance of twice its height, W m-2; an assumed
@@ -20,14 +30,15 @@ def lay_out_construction_site(site: Site, rng: np.random.Generator) -> None:
     """A haul road over bare ground between fences, machines, heaps and an unfinished building."""
     ground = (m.SOIL if rng.random() < 0.6 else m.GRAVEL).draw(rng)
     far, half = site.travel_m + REACH_M, rng.uniform(2.6, 4.2)
-    site.build(meshes.patch((-BEHIND_M, far), (-REACH_M, REACH_M), 0.0, ground))
+    site.build_ground(ground)
     track = m.GRAVEL.draw(rng)
     site.build(meshes.patch((-BEHIND_M, far), (-half, half), 0.004, track))
     build_puddles(site, rng, (-half, half))
     if rng.random() < 0.5:
         put_blockage(site, rng)
-    put_machines(site, rng, half)
-    put_crew(site, rng, half)
+    for part in site.stretches():
+        put_machines(part, rng, half)
+        put_crew(part, rng, half)
     # The building stands on one side of the road, and the fence on the other.
     side = rng.choice([-1, 1])
     inwards = -side * np.pi / 2
@@ -60,7 +71,7 @@ def put_machines(site: Site, rng: np.random.Generator, half: float) -> None:
         speed = rng.uniform(1.0, 5.0) if rng.random() < 0.6 else 0.0
         x = rng.uniform(6.0, 20.0) + 0.5 * site.travel_m
         offset = rng.uniform(0.3, 1.0) * (half - 1.2)
-        site.put_moving(dumper(rng), Arc(Pose((x, offset, 0.0), np.pi), speed))
+        put_driver(site, dumper(rng), Pose((x, offset, 0.0), np.pi), speed)
 
 
 def put_crew(site: Site, rng: np.random.Generator, half: float) -> None:
@@ -69,14 +80,15 @@ def put_crew(site: Site, rng: np.random.Generator, half: float) -> None:
         somebody, speed = passing_worker(rng)
         for _ in range(TRIES):
             place = (site.travel_m + rng.uniform(1.2, 14.0), rng.uniform(-half, half), 0.004)
-            if site.put_moving(somebody, Arc(Pose(place, rng.uniform(-np.pi, np.pi)), speed)):
+            start = Pose(place, rng.uniform(-np.pi, np.pi))
+            if site.put_moving(somebody, strolling(site, rng, start, speed)):
                 break
 
 
-def passing_worker(rng: np.random.Generator, wetness: float = 0.0) -> tuple[Mesh, float]:
+def passing_worker(rng: np.random.Generator, wetness: float = 0.0) -> tuple[Mover, float]:
     """A worker who stands or walks, and their speed in m/s; rain makes no difference."""
     speed = rng.uniform(0.5, 1.6) if rng.random() < 0.6 else 0.0
-    return worker(rng, people.STRIDE_S * speed), speed
+    return worker(rng), speed
 
 
 def put_flood_light(site: Site, rng: np.random.Generator, half: float) -> None:
@@ -100,22 +112,18 @@ def stored_thing(rng: np.random.Generator) -> Mesh:
 
 
 @meshes.thing
-def worker(rng: np.random.Generator, stride_m: float = 0.0) -> Mesh:
+def worker(rng: np.random.Generator) -> Mover:
     """Somebody in a helmet and a vest with two retro-reflecting hoops."""
-    phase, vest, tape = rng.uniform(-np.pi, np.pi), m.CLOTHES.draw(rng), m.RETRO_SHEET.draw(rng)
+    vest, tape = m.CLOTHES.draw(rng), m.RETRO_SHEET.draw(rng)
     trunk = [(0.0, 0.0), (0.18, 0.0), (0.17, 0.15), (0.22, 0.5), (0.19, 0.62), (0.0, 0.70)]
     hoops = [[(0.188, 0.20), (0.196, 0.26)], [(0.213, 0.36), (0.221, 0.42)]]
     body = [meshes.lathe(trunk, vest, sections=10)]
     # A few millimetres off the vest, and pressed flat along with it.
     body += [meshes.lathe(hoop, tape, sections=10) for hoop in hoops]
     upright = meshes.at(meshes.scaled(meshes.join(body), (0.62, 1.0, 1.0)), 0.0, 0.0, 0.80)
-    parts = [
-        people.legs(rng, stride_m, phase),
-        upright,
-        people.arms(rng, stride_m * np.cos(phase), rng.choice([0.0, 0.0, 0.35])),
-        people.head(rng, (0.02, 0.0, 1.62), helmet=True),
-    ]
-    return meshes.scaled(meshes.join(parts), (rng.uniform(0.92, 1.08),) * 3)
+    whole = meshes.join([upright, people.head(rng, (0.02, 0.0, 1.62), helmet=True)])
+    height, reach = people.HEIGHT_M * rng.uniform(0.92, 1.08), rng.choice([0.0, 0.0, 0.35])
+    return Mover((people.walking(rng, whole, height, 1.0, reach),))
 
 
 @meshes.thing
@@ -146,23 +154,24 @@ def excavator(rng: np.random.Generator) -> Mesh:
 
 
 @meshes.thing
-def dumper(rng: np.random.Generator) -> Mesh:
+def dumper(rng: np.random.Generator) -> Mover:
     """A small tipper with its skip before the driver."""
     paint, tyre, dark = m.MACHINE_PAINT.draw(rng), m.TYRE.draw(rng), m.DARK_METAL.draw(rng)
     skip = [(0.2, 0.85), (1.3, 0.85), (1.75, 1.55), (0.0, 1.55)]
-    return meshes.join(
+    body = meshes.join(
         [
-            # Skip, frame, engine, wheels, roll bar, driver.
+            # Skip, frame, engine, roll bar, driver.
             meshes.extrude(skip, 1.7, paint),
             meshes.box((2.6, 0.9, 0.35), dark, (0.0, 0.0, 0.5)),
             meshes.box((1.0, 1.2, 0.6), paint, (-1.0, 0.0, 0.86)),
-            *(wheel(x, side, 0.85, 0.45, tyre, dark) for x in (0.8, -0.9) for side in (-1, 1)),
             *(meshes.rod((-1.3, y, 1.4), (-1.3, y, 2.4), 0.04, dark, 5) for y in (-0.5, 0.5)),
             meshes.rod((-1.3, -0.5, 2.4), (-1.3, 0.5, 2.4), 0.04, dark, sections=5),
             people.torso(rng, (-0.75, 0.0, 1.4)),
             people.head(rng, (-0.72, 0.0, 2.25), helmet=True),
         ]
     )
+    wheels = (axle(x, 0.85, 0.45, tyre, dark) for x in (0.8, -0.9))
+    return Mover((Rigid(body), *wheels))
 
 
 @meshes.thing

@@ -5,28 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from shotenv.world.families.roads import BEHIND_M, REACH_M, build_puddles
-from shotenv.world.families.traffic import TRIES, draw_one, put_row, put_walkers
-from shotenv.world.geometry import Arc, Mesh, Pose, Site, materials as m, meshes
-from shotenv.world.things import cycles, plants
+from shotenv.world.families.traffic import TRIES, draw_one, put_driver, put_row, put_walkers
+from shotenv.world.geometry import Arc, Mesh, Mover, Pose, Site, materials as m, meshes
+from shotenv.world.things import animals, cycles, plants
 
 
 def lay_out_forest_path(site: Site, rng: np.random.Generator) -> None:
     """A winding strip of trodden soil under trees, perhaps blocked by a fallen trunk."""
-    half, far = rng.uniform(0.9, 1.6), site.travel_m + REACH_M
-    litter = (m.LEAF_LITTER if rng.random() < 0.6 else m.GRASS).draw(rng)
-    site.build(meshes.patch((-BEHIND_M, far), (-REACH_M, REACH_M), 0.0, litter))
+    half = rng.uniform(0.9, 1.6)
+    site.build_ground((m.LEAF_LITTER if rng.random() < 0.6 else m.GRASS).draw(rng))
     build_trodden_strip(site, rng, half)
     build_puddles(site, rng, (-1.5, 1.5))
     if rng.random() < 0.45:
         # The power favours short distances, and most obstacles of the near field are close.
         x = site.travel_m + 1.5 + 7.0 * rng.uniform() ** 1.5
         site.put(fallen_tree(rng), x, rng.uniform(-1.0, 1.0), rng.uniform(1.2, 1.9))
-    put_walkers(site, rng, (0, 3), (-half + 0.2, half - 0.2), 0.004)
-    if rng.random() < 0.3:
-        x, speed = site.travel_m + rng.uniform(5.0, 14.0), rng.uniform(2.0, 6.0)
-        path = Arc(Pose((x, 0.4 * half, 0.004), np.pi), speed)
-        site.put_moving(cycles.cyclist(rng), path)
-    put_deer(site, rng, half)
+    for part in site.stretches():
+        put_walkers(part, rng, (0, 3), (-half + 0.2, half - 0.2), 0.004)
+        if rng.random() < 0.3:
+            x, speed = part.travel_m + rng.uniform(5.0, 14.0), rng.uniform(2.0, 6.0)
+            put_driver(part, cycles.cyclist(rng), Pose((x, 0.4 * half, 0.004), np.pi), speed)
+        put_deer(part, rng, half)
     # The further off, the sparser and the coarser: what is behind is mostly hidden.
     for side in (-1, 1):
         edge = side * (half + 0.5)
@@ -50,7 +49,7 @@ def build_trodden_strip(site: Site, rng: np.random.Generator, half: float) -> No
 def put_deer(site: Site, rng: np.random.Generator, half: float) -> None:
     """Perhaps a few deer that stand or run across."""
     for _ in range(rng.integers(0, 3)):
-        speed = rng.uniform(1.0, 7.0) if rng.random() < 0.5 else 0.0
+        speed = rng.uniform(0.8, 5.0) if rng.random() < 0.5 else 0.0
         animal, side = deer(rng), rng.choice([-1.0, 1.0])
         for _ in range(TRIES):
             x, away = site.travel_m + rng.uniform(3.0, 16.0), side * rng.uniform(half + 0.8, 7.0)
@@ -176,15 +175,12 @@ def root_plate(rng: np.random.Generator) -> Mesh:
 
 
 @meshes.thing
-def deer(rng: np.random.Generator) -> Mesh:
+def deer(rng: np.random.Generator) -> Mover:
     """A roe or red deer, with or without antlers."""
     coat, size = m.Finish((0.30, 0.50), 0.2, 0.4).draw(rng), rng.uniform(0.75, 1.15)
-    stride = rng.uniform(-0.15, 0.15)
-    legs_at = [(x + s * stride, 0.09 * s, x) for x in (-0.42, 0.38) for s in (-1, 1)]
-    # Trunk, legs, neck, head, ears.
+    # Trunk, neck, head, ears.
     parts = [
         meshes.rod((-0.5, 0, 0.88), (0.45, 0, 0.92), 0.2, coat, sections=8),
-        *(meshes.rod((foot, y, 0.0), (x, y, 0.85), 0.045, coat, 5) for foot, y, x in legs_at),
         meshes.rod((0.42, 0, 0.95), (0.72, 0, 1.4), 0.09, coat, sections=6),
         meshes.rod((0.66, 0, 1.42), (1.0, 0, 1.3), 0.075, coat, sections=6),
         *(meshes.rod((0.68, y, 1.45), (0.62, 2 * y, 1.6), 0.03, coat, 4) for y in (-0.06, 0.06)),
@@ -194,4 +190,6 @@ def deer(rng: np.random.Generator) -> Mesh:
             meshes.rod((0.7, y, 1.45), (0.6, 4 * y, 1.9), 0.02, m.BARK.draw(rng), 4)
             for y in (-0.05, 0.05)
         ]
-    return meshes.scaled(meshes.join(parts), (size, size, size))
+    hips, lengths = ((-0.42, 0.38), (-0.09, 0.09)), (0.41, 0.41, 0.03)
+    trunk = meshes.join(parts)
+    return Mover((animals.four_legged(rng, trunk, hips, lengths, 0.055, coat, size),))

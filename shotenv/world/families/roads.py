@@ -26,6 +26,8 @@ SHOP_RADIANCE = (2e-3, 5e-2)
 """Radiance of the ceiling of a shop that is lit by night, W m-2 sr-1; an assumed range."""
 KERB_M = 0.12
 """Height of a pavement over the road."""
+UNDER_ROAD_M = -0.01
+"""Height of the ground beside a road, which lies under the road as well."""
 PAINT_M = 0.008
 PUDDLE_M = 0.013
 """Heights of paint and of water over the ground: each layer above those that it may cover."""
@@ -33,18 +35,17 @@ PUDDLE_M = 0.013
 
 def lay_out_country_road(site: Site, rng: np.random.Generator) -> None:
     """Two lanes, verges, trees, signs, guard rails, traffic."""
-    lane, far = rng.uniform(3.0, 3.75), site.travel_m + REACH_M
+    lane = rng.uniform(3.0, 3.75)
     # Traffic drives on the right: the other lane is to the left, that is towards +y.
     right, left = -lane / 2 - 0.4, 1.5 * lane + 0.4
     build_carriageway(site, rng, right, left, lane)
-    verge = (m.GRASS if rng.random() < 0.7 else m.SOIL).draw(rng)
-    for y in ((-REACH_M, right), (left, REACH_M)):
-        site.build(meshes.patch((-BEHIND_M, far), y, 0.0, verge))
+    site.build_ground((m.GRASS if rng.random() < 0.7 else m.SOIL).draw(rng), UNDER_ROAD_M)
     # What moves comes first: its way must be free for the whole clip, and parked things fill up.
-    put_oncoming(site, rng, lane)
     put_vehicle_ahead(site, rng)
-    put_walkers(site, rng, (0, 3), (right - 1.5, right - 0.6))
-    put_cyclist(site, rng, right + 0.35)
+    for part in site.stretches():
+        put_oncoming(part, rng, lane)
+        put_walkers(part, rng, (0, 3), (right - 1.5, right - 0.6))
+        put_cyclist(part, rng, right + 0.35)
     if rng.random() < 0.4:
         rail = furniture.guard_rail if rng.random() < 0.6 else furniture.jersey_barrier
         length, x = rng.uniform(12.0, 30.0), site.travel_m / 2 + rng.uniform(6, 20)
@@ -69,16 +70,19 @@ def lay_out_town_street(site: Site, rng: np.random.Generator) -> None:
     pavement = rng.uniform(1.8, 3.2)
     build_carriageway(site, rng, right, left, lane, edge_lines=False)
     paving = m.PAVING.draw(rng)
+    site.build_ground(m.GRASS.draw(rng) if rng.random() < 0.5 else paving, UNDER_ROAD_M)
     for side, kerb in ((-1, right), (1, left)):
-        site.build(side_walk(rng, side, kerb, (-BEHIND_M, far), paving))
+        site.build(side_walk(rng, side, kerb, (-BEHIND_M, far), pavement + 1.0, paving))
     put_facades(site, rng, right - pavement, np.pi / 2)
     put_facades(site, rng, left + pavement, -np.pi / 2)
     put_vehicle_ahead(site, rng)
-    put_oncoming(site, rng, lane)
-    put_crossers(site, rng, (right + 0.3, left - 0.3))
-    put_walkers(site, rng, (1, 4), (right - pavement + 0.5, right - 0.5), KERB_M)
-    put_walkers(site, rng, (0, 3), (left + 0.5, left + pavement - 0.5), KERB_M)
-    put_cyclist(site, rng, -lane / 2 - 0.1)
+    for part in site.stretches():
+        # Who crosses comes first: drivers stop for them.
+        put_crossers(part, rng, (right + 0.3, left - 0.3))
+        put_oncoming(part, rng, lane)
+        put_walkers(part, rng, (1, 4), (right - pavement + 0.5, right - 0.5), KERB_M)
+        put_walkers(part, rng, (0, 3), (left + 0.5, left + pavement - 0.5), KERB_M)
+        put_cyclist(part, rng, -lane / 2 - 0.1)
     put_row(
         site,
         rng,
@@ -105,23 +109,29 @@ def lay_out_town_street(site: Site, rng: np.random.Generator) -> None:
 
 def lay_out_car_park(site: Site, rng: np.random.Generator) -> None:
     """The ego noses up to a wall, a hedge or a car; more cars and people beside."""
-    far = site.travel_m + REACH_M
-    ground = (m.ASPHALT if rng.random() < 0.6 else m.PAVING).draw(rng)
-    site.build(meshes.patch((-BEHIND_M, far), (-REACH_M, REACH_M), 0.0, ground))
+    site.build_ground((m.ASPHALT if rng.random() < 0.6 else m.PAVING).draw(rng))
     # The power favours short distances: car parks are much of the near field.
     end = site.travel_m + 0.7 + 5.0 * rng.uniform() ** 1.5
     paint_bays(site, rng, end, rng.uniform(2.5, 2.9))
     build_puddles(site, rng, (-5.0, 5.0))
+    # Walls, hedges and houses all around: who turns looks to every side.
+    for side in (-1, 1):
+        for x in np.arange(end - 28.0, end + 25.0, 13.0):
+            if rng.random() < 0.7:
+                site.put(backdrop(rng), x, side * rng.uniform(13.0, 20.0), -side * np.pi / 2)
+    for y in (-14.0, 0.0, 14.0):
+        site.put(backdrop(rng), end - rng.uniform(32.0, 38.0), y)
     ahead = rng.random()
     if ahead < 0.35:
-        car, facing = vehicles.car(rng), np.pi if rng.random() < 0.5 else 0.0
+        car, facing = vehicles.car(rng).at_rest, np.pi if rng.random() < 0.5 else 0.0
         half_length = float(car.corners[..., 0].max())
         site.put(car, end + half_length, rng.uniform(-0.4, 0.4), facing)
         site.put(backdrop(rng), end + rng.uniform(7, 14), rng.uniform(-3, 3), np.pi)
     elif ahead < 0.9:
         site.put(backdrop(rng), end, rng.uniform(-2, 2), np.pi)
-    for x in np.arange(end - 3.0, end + 12.0, 5.5):
-        for y in (-5.4, -2.7, 2.7, 5.4):
+    # Beside the ego, beyond what it faces, and behind it, where it looks when it turns.
+    for x in (end - 3.0, end + 2.5, end + 8.0, end - 14.0, end - 19.5):
+        for y in 2.7 * np.arange(-4, 5):
             if rng.random() < 0.5:
                 site.put(
                     vehicles.parked_car(rng), x, y + rng.uniform(-0.2, 0.2), rng.integers(2) * np.pi
@@ -189,12 +199,12 @@ def build_puddles(site: Site, rng: np.random.Generator, y: Range) -> None:
 
 
 def side_walk(
-    rng: np.random.Generator, side: int, kerb: float, x: tuple[float, float], paving: m.Material
+    rng: np.random.Generator, side: int, kerb: float, x: Range, width: float, paving: m.Material
 ) -> Mesh:
     """A raised pavement beyond a kerb stone; `side` is -1 on the right."""
     stone, inner = m.CONCRETE.draw(rng), kerb + side * 0.15
     across = sorted((kerb, inner))
-    outer = sorted((inner, side * REACH_M))
+    outer = sorted((inner, kerb + side * width))
     middle, length = sum(x) / 2, x[1] - x[0]
     return meshes.join(
         [

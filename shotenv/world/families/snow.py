@@ -17,24 +17,35 @@ from shotenv.world.families.traffic import (
     put_vehicle_ahead,
     put_walkers,
 )
-from shotenv.world.geometry import Arc, Material, Mesh, Pose, Site, materials as m, meshes
-from shotenv.world.things import cab, nose_lamps, people, plants, vehicles, wheel
+from shotenv.world.geometry import (
+    Arc,
+    Material,
+    Mesh,
+    Mover,
+    Pose,
+    Rigid,
+    Site,
+    materials as m,
+    meshes,
+)
+from shotenv.world.things import axle, cab, nose_lamps, people, plants, vehicles
 
 
 def lay_out_snowy_street(site: Site, rng: np.random.Generator) -> None:
     """A cleared lane between banks of snow, chalets, snowed-in cars and trees."""
-    half, far = rng.uniform(2.4, 3.4), site.travel_m + REACH_M
-    site.build(meshes.patch((-BEHIND_M, far), (-REACH_M, REACH_M), 0.0, m.SNOW.draw(rng)))
+    half = rng.uniform(2.4, 3.4)
+    site.build_ground(m.SNOW.draw(rng))
     build_wheel_tracks(site, rng)
     put_vehicle_ahead(site, rng)
-    if rng.random() < 0.5:
-        x, lane = rng.uniform(8.0, 24.0) + 0.5 * site.travel_m, rng.uniform(0.5, 0.9) * half
-        draw = snow_plough if rng.random() < 0.6 else vehicles.traffic
-        put_approaching(site, rng, Arc(Pose((x, lane, 0.0), np.pi), rng.uniform(2.0, 8.0)), draw)
-    put_crossers(site, rng, (-half, half))
-    for _ in range(rng.integers(0, 3)):
-        put_sledge(site, rng, half)
-    put_walkers(site, rng, (0, 3), (-half + 0.3, half - 0.3))
+    for part in site.stretches():
+        if rng.random() < 0.5:
+            x, lane = rng.uniform(8.0, 24.0) + 0.5 * part.travel_m, rng.uniform(0.5, 0.9) * half
+            draw = snow_plough if rng.random() < 0.6 else vehicles.traffic
+            put_approaching(part, rng, Pose((x, lane, 0.0), np.pi), rng.uniform(2.0, 8.0), draw)
+        put_crossers(part, rng, (-half, half))
+        for _ in range(rng.integers(0, 3)):
+            put_sledge(part, rng, half)
+        put_walkers(part, rng, (0, 3), (-half + 0.3, half - 0.3))
     if rng.random() < 0.4:
         x = site.travel_m + 1.0 + 6.0 * rng.uniform() ** 1.5
         blocking = draw_one(rng, (snow_bank, snowman))
@@ -66,11 +77,11 @@ def build_wheel_tracks(site: Site, rng: np.random.Generator) -> None:
 
 def put_sledge(site: Site, rng: np.random.Generator, half: float) -> None:
     """Somebody who pulls a sledge along the street."""
-    mesh, speed = sledge(rng), rng.uniform(0.7, 1.4)
+    mover, speed = sledge(rng), rng.uniform(0.7, 1.4)
     for _ in range(TRIES):
         place = (site.travel_m + rng.uniform(1.5, 12.0), rng.uniform(-half, half), 0.0)
         yaw = rng.integers(2) * np.pi + rng.uniform(-0.2, 0.2)
-        if site.put_moving(mesh, Arc(Pose(place, yaw), speed)):
+        if site.put_moving(mover, Arc(Pose(place, yaw), speed)):
             return
 
 
@@ -149,7 +160,7 @@ def chalet(rng: np.random.Generator) -> Mesh:
 
 
 @meshes.thing
-def snow_plough(rng: np.random.Generator, headlight_radiance: float = 0.0) -> Mesh:
+def snow_plough(rng: np.random.Generator, headlight_radiance: float = 0.0) -> Mover:
     """A lorry that grits the road behind a wide blade."""
     front, width, blade = 2.6, 2.3, m.MACHINE_PAINT.draw(rng)
     tyre, rim, half = m.TYRE.draw(rng), m.METAL.draw(rng), 1.4
@@ -163,7 +174,7 @@ def snow_plough(rng: np.random.Generator, headlight_radiance: float = 0.0) -> Me
     )  # fmt: skip
     hopper = [(-2.5, 1.0), (0.5, 1.0), (0.7, 2.2), (-2.7, 2.2)]
     edge = meshes.back((-half, half), (0.0, 0.06), front + 0.6, blade)
-    return meshes.join(
+    body = meshes.join(
         [
             cab(rng, front, width),
             meshes.box((5.0, 0.8, 0.4), m.DARK_METAL.draw(rng), (0.0, 0.0, 0.6)),
@@ -172,20 +183,21 @@ def snow_plough(rng: np.random.Generator, headlight_radiance: float = 0.0) -> Me
             edge,
             meshes.box((0.7, 0.8, 0.3), rim, (front + 0.3, 0.0, 0.35)),
             nose_lamps(rng, front + 0.02, width, headlight_radiance),
-            *(wheel(x, s, width / 2, 0.46, tyre, rim) for x in (1.7, -1.6) for s in (-1, 1)),
         ]
     )
+    wheels = (axle(x, width / 2, 0.46, tyre, rim) for x in (1.7, -1.6))
+    return Mover((Rigid(body), *wheels))
 
 
 @meshes.thing
-def sledge(rng: np.random.Generator) -> Mesh:
+def sledge(rng: np.random.Generator) -> Mover:
     """Somebody who pulls a sledge, often with a child on it."""
     wood, rope = m.WOOD.draw(rng), m.LEATHER.draw(rng)
-    runners = [meshes.box((1.0, 0.04, 0.14), wood, (-1.6, y, 0.0)) for y in (-0.18, 0.18)]
-    seat = meshes.box((0.9, 0.44, 0.04), wood, (-1.6, 0.0, 0.14))
-    line = meshes.rod((-1.1, 0.0, 0.1), (-0.1, 0.2, 0.86), 0.01, rope, sections=3)
-    parts = [people.adult(rng, people.STRIDE_S), *runners, seat, line]
+    runners = [meshes.box((1.0, 0.04, 0.14), wood, (-1.7, y, 0.0)) for y in (-0.18, 0.18)]
+    seat = meshes.box((0.9, 0.44, 0.04), wood, (-1.7, 0.0, 0.14))
+    line = meshes.rod((-1.2, 0.0, 0.1), (-0.1, 0.2, 0.86), 0.01, rope, sections=3)
+    parts = [*runners, seat, line]
     if rng.random() < 0.6:
-        parts.append(people.torso(rng, (-1.7, 0.0, 0.18)))
-        parts.append(people.head(rng, (-1.66, 0.0, 1.02)))
-    return meshes.join(parts)
+        parts.append(people.torso(rng, (-1.8, 0.0, 0.18)))
+        parts.append(people.head(rng, (-1.76, 0.0, 1.02)))
+    return people.beside(people.adult(rng), Rigid(meshes.join(parts)))

@@ -6,11 +6,20 @@ from collections.abc import Callable
 
 import numpy as np
 
+from shotenv.world.families.following import (
+    ahead_of_ego,
+    behind_others,
+    to_the_wall,
+    walk_across,
+    with_pause,
+)
 from shotenv.world.geometry import (
     Arc,
     Lamp,
     Mesh,
+    Mover,
     Pose,
+    Route,
     Site,
     ground_speed_m_s,
     lights,
@@ -29,19 +38,22 @@ STREET_IRRADIANCE = (1e-3, 2e-2)
 """Irradiance in band below a street lamp, W m-2; an assumed range."""
 TRIES = 4
 """Places that are tried for something that moves, before it is left out."""
-DrawPasser = Callable[[np.random.Generator, float], tuple[Mesh, float]]
-"""Draws a mesh and its speed in m/s, given how wet it is."""
+DrawPasser = Callable[[np.random.Generator, float], tuple[Mover, float]]
+"""Draws who passes and their speed in m/s, given how wet it is."""
 
 
-def passer_by(rng: np.random.Generator, wetness: float) -> tuple[Mesh, float]:
-    """Somebody along a road, on foot or on a kick scooter, and their speed in m/s."""
+def passer_by(rng: np.random.Generator, wetness: float) -> tuple[Mover, float]:
+    """Somebody along a road, on foot, running or on a kick scooter, and their speed in m/s."""
     speed = rng.uniform(0.7, 1.8) if rng.random() < 0.75 else 0.0
-    if speed and rng.random() < 0.06:
+    kind = rng.random()
+    if speed and kind < 0.06:
         return cycles.kick_scooter(rng), 2.0 * speed
+    if speed and kind < 0.12:
+        return people.adult(rng), rng.uniform(2.4, 3.6)
     return people.somebody(rng, speed, wetness), speed
 
 
-def crosser(rng: np.random.Generator, wetness: float) -> tuple[Mesh, float]:
+def crosser(rng: np.random.Generator, wetness: float) -> tuple[Mover, float]:
     """Somebody who crosses a road, on foot or on a bicycle, and their speed in m/s."""
     if rng.random() < 0.2:
         return cycles.cyclist(rng), rng.uniform(2.0, 5.0)
@@ -64,11 +76,25 @@ def put_walkers(
     far = max(near, min(near + 17.0, site.room[1, 0] - 0.5))
     for _ in range(rng.integers(*count)):
         somebody, speed = draw(rng, site.weather.wetness)
+        # Half of them are passed on the way, where there is room beside it.
+        first = min(2.0, near) if rng.random() < 0.5 else near
         for _ in range(TRIES):
             yaw = rng.integers(2) * np.pi + rng.uniform(-0.05, 0.05)
-            place = (rng.uniform(near, far), rng.uniform(*y), z)
-            if site.put_moving(somebody, Arc(Pose(place, yaw), speed)):
+            place = (rng.uniform(first, far), rng.uniform(*y), z)
+            if site.put_moving(somebody, strolling(site, rng, Pose(place, yaw), speed)):
                 break
+
+
+def strolling(site: Site, rng: np.random.Generator, start: Pose, speed_m_s: float) -> Route:
+    """Straight on, mostly without a stop, or up to a wall."""
+    left_m = to_the_wall(site, start) - 0.8
+    if 1.0 < left_m < speed_m_s * site.duration_s:
+        begin_s = rng.uniform(-1.0, 0.3 * site.duration_s)
+        return walk_across(site, Arc(start, 1.0), begin_s, left_m, speed_m_s)
+    stop_s, pause_s = rng.uniform(0.0, 1.5 * site.duration_s), rng.uniform(2.0, 8.0)
+    if speed_m_s == 0.0 or rng.random() > 0.2:
+        return Arc(start, speed_m_s)
+    return with_pause(site, Arc(start, 1.0), speed_m_s, stop_s, stop_s + pause_s)
 
 
 def put_crossers(
@@ -78,60 +104,107 @@ def put_crossers(
     near: float = 1.5,
     draw: DrawPasser = crosser,
 ) -> None:
-    """Up to two who cross in front of the ego and stay between `y` during the clip."""
+    """Up to two who cross before the ego, from one of the `y` to the other, or wait to do so."""
     span = min(7.0, site.room[1, 0] - site.travel_m - near - 0.5)
     for _ in range(rng.integers(0, 3)):
-        somebody, wish = draw(rng, site.weather.wetness)
-        # In a long clip they walk slower, rather than through what stands beside the road.
-        speed = min(wish, (y[1] - y[0]) / site.duration_s)
-        # What is left to choose the start from, if the whole walk is to fit between the sides.
-        room = y[1] - y[0] - speed * site.duration_s
+        somebody, speed = draw(rng, site.weather.wetness)
         for _ in range(TRIES):
-            start, side = y[0] + rng.uniform() * room, rng.choice([-1.0, 1.0])
-            across = start if side > 0 else y[0] + y[1] - start
+            side = rng.choice([-1.0, 1.0])
+            # Where the ego will stop or, as often, where it will have passed.
             x = site.travel_m + near + max(span, 0.0) * rng.uniform() ** 1.5
+            x = x if rng.random() < 0.5 else rng.uniform(min(6.0, x), x)
             yaw = side * np.pi / 2 + rng.uniform(-0.2, 0.2)
-            if site.put_moving(somebody, Arc(Pose((x, across, 0.0), yaw), speed)):
+            path = Arc(Pose((x, y[0] if side > 0 else y[1], 0.0), yaw), 1.0)
+            walk = (y[1] - y[0]) / max(speed, 0.3)
+            # Under way when the clip begins, or from a moment within it on.
+            begin_s = rng.uniform(-0.8 * walk, 0.8 * site.duration_s)
+            if speed == 0.0 or rng.random() < 0.15:
+                # Waits for all that passes.
+                begin_s = site.duration_s + 1.0
+            if site.put_moving(
+                somebody, walk_across(site, path, begin_s, y[1] - y[0], max(speed, 0.3))
+            ):
                 break
 
 
 def put_vehicle_ahead(site: Site, rng: np.random.Generator) -> None:
-    """Perhaps a vehicle ahead in the ego's lane: close in a queue, further off when fast."""
+    """Perhaps vehicles ahead in the ego's lane: close in a queue, further off when fast."""
     if rng.random() < 0.4:
         return
-    ego_speed = ground_speed_m_s(site.ego, 0.0)
-    speed = ego_speed * rng.uniform(0.8, 1.15)
-    # Braking shortens the gap during the clip.
-    gap = 0.6 + rng.uniform(0.0, 3.5) + 0.8 * ego_speed * rng.uniform(0.3, 1.2)
-    tail = m.log_uniform(rng, TAIL_RADIANCE) if site.night else 0.0
-    vehicle = cycles.cyclist(rng) if rng.random() < 0.12 else vehicles.traffic(rng, 0.0, tail)
-    # The gap is to its rear, however long it is.
-    rear = float(vehicle.corners[..., 0].min())
-    start = Pose((gap + 0.4 - rear, rng.uniform(-0.3, 0.3), 0.0))
-    site.put_moving(vehicle, Arc(start, speed))
+    ego_speed = abs(ground_speed_m_s(site.ego, 0.0))
+    y, reaction_s = rng.uniform(-0.3, 0.3), rng.uniform(0.3, 1.2)
+    # The rear of the vehicle that comes next: what the ego goes before it reacts stays free.
+    rear = 1.2 + rng.uniform(0.0, 4.0) + ego_speed * (reaction_s + rng.uniform(0.0, 0.8))
+    unrest, period_s, phase = rng.uniform(0.0, 0.25), rng.uniform(5.0, 15.0), rng.uniform()
+    # Where the ego stands all the time, the queue before it may set off.
+    leaves_s = rng.uniform(-2.0, 1.2 * site.duration_s)
+    sets_off = site.travel_m == 0.0 and rng.random() < 0.5
+    for place in range(1 + (rng.random() < 0.3)):
+        tail = m.log_uniform(rng, TAIL_RADIANCE) if site.night else 0.0
+        narrow = place == 0 and rng.random() < 0.12
+        vehicle = cycles.cyclist(rng) if narrow else vehicles.traffic(rng, 0.0, tail)
+        back, nose, _ = extent(vehicle)
+        path = Arc(Pose((rear - back, y, 0.0)), 1.0)
+        # Who is further ahead does everything earlier.
+        route = ahead_of_ego(site, path, (place + 1) * reaction_s, unrest, period_s, phase)
+        if sets_off:
+            delay_s = 0.0 if place else reaction_s
+            route = walk_across(site, path, leaves_s + delay_s, 200.0, rng.uniform(4.0, 10.0))
+        if not site.put_moving(vehicle, route):
+            return
+        rear += nose - back + rng.uniform(1.5, 4.0) + ego_speed * (reaction_s + 0.3)
+
+
+def extent(mover: Mover) -> tuple[float, float, float]:
+    """Rear and front end, and half the width of what stands at the origin, metres."""
+    corners = mover.at_rest.corners
+    return float(corners[..., 0].min()), float(corners[..., 0].max()), float(corners[..., 1].max())
 
 
 def put_oncoming(site: Site, rng: np.random.Generator, lane: float) -> None:
-    """Up to two vehicles in the other lane, coming closer or standing in a queue."""
-    for _ in range(rng.integers(0, 3)):
+    """Vehicles in the other lane, coming closer, stopped at a light or standing in a queue."""
+    x = rng.uniform(5.0, 28.0) + 0.5 * site.travel_m
+    red = (rng.uniform(5.0, 20.0), rng.uniform(2.0, 10.0)) if rng.random() < 0.25 else None
+    # More of them come in a long clip.
+    count = int(rng.integers(0, 3) + rng.poisson(0.06 * site.duration_s))
+    for _ in range(min(count, 4)):
         speed = rng.uniform(3.0, 14.0) if rng.random() < 0.75 else 0.0
-        x, y = rng.uniform(5.0, 28.0) + 0.5 * site.travel_m, lane + rng.uniform(-0.2, 0.3)
-        put_approaching(site, rng, Arc(Pose((x, y, 0.0), np.pi), speed))
+        start = Pose((x, lane + rng.uniform(-0.2, 0.3), 0.0), np.pi)
+        put_approaching(site, rng, start, speed, red=red)
+        x += rng.uniform(9.0, 30.0)
+        red = None
 
 
 def put_approaching(
     site: Site,
     rng: np.random.Generator,
-    motion: Arc,
-    draw: Callable[[np.random.Generator, float], Mesh] = vehicles.traffic,
+    start: Pose,
+    speed_m_s: float,
+    draw: Callable[[np.random.Generator, float], Mover] = vehicles.traffic,
+    red: tuple[float, float] | None = None,
 ) -> None:
-    """A vehicle seen from the front, in the dark with its head lights on."""
+    """A vehicle seen from the front that brakes for what is ahead; lit in the dark."""
     # In garages and tunnels too, whatever the time of day.
     lit = site.night or site.indoor is not None
     intensity = m.log_uniform(rng, HEADLAMP_W_SR) if lit else 0.0
-    mesh = draw(rng, lights.face_radiance(intensity, HEADLAMP_M2))
-    if site.put_moving(mesh, motion) and intensity:
-        site.lamps += head_lights(mesh, intensity, carrier=len(site.moving) - 1)
+    vehicle = draw(rng, lights.face_radiance(intensity, HEADLAMP_M2))
+    # Lamps are fixed to its first piece.
+    carrier = len(site.moving)
+    if put_driver(site, vehicle, start, speed_m_s, red) and intensity:
+        site.lamps += head_lights(vehicle.at_rest, intensity, carrier)
+
+
+def put_driver(
+    site: Site,
+    vehicle: Mover,
+    start: Pose,
+    speed_m_s: float,
+    red: tuple[float, float] | None = None,
+) -> bool:
+    """A vehicle that goes straight on at a speed where nothing is in its way."""
+    rear, nose, half = extent(vehicle)
+    route = behind_others(site, start, (rear, nose), half, speed_m_s, red)
+    return site.put_moving(vehicle, route)
 
 
 def head_lights(mesh: Mesh, intensity_w_sr: float, carrier: int) -> list[Lamp]:
@@ -149,7 +222,7 @@ def put_cyclist(site: Site, rng: np.random.Generator, y: float) -> None:
     """Perhaps somebody on a bicycle at the edge of the lane."""
     if rng.random() < 0.3:
         x, speed = site.travel_m * rng.uniform() + rng.uniform(4.0, 12.0), rng.uniform(2.5, 6.5)
-        site.put_moving(cycles.cyclist(rng), Arc(Pose((x, y, 0.0)), speed))
+        put_driver(site, cycles.cyclist(rng), Pose((x, y, 0.0)), speed)
 
 
 def put_row(

@@ -5,21 +5,29 @@ from __future__ import annotations
 import numpy as np
 
 from shotenv.world.families.construction import passing_worker
-from shotenv.world.families.roads import BEHIND_M, PAINT_M, REACH_M
-from shotenv.world.families.traffic import draw_one, put_crossers, put_row, put_walkers
+from shotenv.world.families.garage import YARD_M, Hall, build_wall, hall_over, lay_out_yard
+from shotenv.world.families.roads import PAINT_M, REACH_M
+from shotenv.world.families.traffic import (
+    TRIES,
+    draw_one,
+    put_crossers,
+    put_driver,
+    put_row,
+    put_walkers,
+)
 from shotenv.world.geometry import (
-    Arc,
-    Indoor,
     Lamp,
     Material,
     Mesh,
+    Mover,
     Pose,
+    Rigid,
     Site,
     lights,
     materials as m,
     meshes,
 )
-from shotenv.world.things import people, wheel
+from shotenv.world.things import axle, people
 from unwrap.support import Range
 
 RACK_DEPTH_M = 1.1
@@ -37,13 +45,23 @@ def lay_out_warehouse(site: Site, rng: np.random.Generator) -> None:
     # Many clips end close by: near distances would be rare otherwise.
     near = rng.random() < 0.4
     end = site.travel_m + (1.0 + 5.0 * rng.uniform() if near else rng.uniform(9.0, 28.0))
+    if site.road.knots:
+        # Behind the corner there is room for a pallet truck at least.
+        end = max(end, site.road.origin_m + 4.0)
     half = aisle / 2 + 2 * RACK_DEPTH_M + 2.8
-    build_hall_shell(site, rng, end, half, height)
+    # Straight on through the open gate of a dock, into the yard.
+    leaves = rng.random() < 0.25 and site.travel_m > 3.0 and not site.road.knots
+    if leaves:
+        end = max(site.travel_m * rng.uniform(0.4, 0.9), site.travel_m - YARD_M) + 0.5
+    hall = hall_over(site, -12.0, end, half)
+    build_hall_shell(site, rng, hall, height)
+    build_docks(site, rng, hall, height, leaves)
     paint_aisle(site, rng, end, aisle)
     site.enclose((-10.0, end - 0.05), (-half + 0.05, half - 0.05), height - 0.5)
-    put_crossers(site, rng, (-aisle / 2, aisle / 2), near=0.8, draw=passing_worker)
-    put_fork_lift(site, rng, end, aisle)
-    put_walkers(site, rng, (0, 2), (-aisle / 2 + 0.3, aisle / 2 - 0.3), draw=passing_worker)
+    for part in site.stretches():
+        put_crossers(part, rng, (-aisle / 2, aisle / 2), near=0.8, draw=passing_worker)
+        put_fork_lift(part, rng, end, aisle)
+        put_walkers(part, rng, (0, 3), (-aisle / 2 + 0.3, aisle / 2 - 0.3), draw=passing_worker)
     for side in (-1, 1):
         y = side * (aisle / 2 + RACK_DEPTH_M / 2 + 0.1)
         put_row(site, rng, floor_thing, side * (aisle / 2 - 0.35), 3.0, 0.0, share=0.35)
@@ -53,50 +71,57 @@ def lay_out_warehouse(site: Site, rng: np.random.Generator) -> None:
     for y in np.arange(-half + 1.5, half - 1.0, 1.7):
         site.put(floor_thing(rng), end - rng.uniform(1, 2.2), y)
     build_high_bays(site, rng, end, height)
+    if leaves:
+        lay_out_yard(site, rng, (end, end + REACH_M))
 
 
-def build_hall_shell(
-    site: Site, rng: np.random.Generator, end: float, half: float, height: float
-) -> None:
-    """Floor, clad walls, a roof on trusses, and an end wall with docks, one of them open or not."""
+def build_hall_shell(site: Site, rng: np.random.Generator, hall: Hall, height: float) -> None:
+    """Floor, clad walls to three sides, a roof on trusses."""
     cladding, roof, steel = m.METAL.draw(rng), m.WHITE_PAINT.draw(rng), m.METAL.draw(rng)
-    x = (-12.0, end)
-    middle, length = sum(x) / 2, end - x[0]
-    site.build(meshes.patch((x[0], end + 0.3), (-half, half), 0.0, m.COATED_FLOOR.draw(rng)))
-    site.build(meshes.box((length, 2 * half + 1.0, 0.3), roof, (middle, 0.0, height)))
-    for along in np.arange(x[0] + 3.0, end, 6.0):
-        site.build(meshes.box((0.2, 2 * half, 0.45), steel, (along, 0.0, height - 0.45)))
-        for side in (-1, 1):
-            column = meshes.box((0.3, 0.3, height), steel, (along, side * (half - 0.15), 0.0))
-            site.build(column)
-    for side in (-1, 1):
-        wall = meshes.box((length, 0.3, height), cladding, (middle, side * (half + 0.15), 0.0))
-        site.build(wall)
-    site.build(meshes.box((0.3, 2 * half, height), cladding, (x[0] - 0.15, 0.0, 0.0)))
-    build_docks(site, rng, end, half, height, cladding)
+    (x, y), (length, width) = hall.middle, hall.size
+    parts = [
+        # To the threshold of the gates, under the end wall.
+        meshes.patch((hall.x[0], hall.x[1] + 0.3), hall.y, 0.0, m.COATED_FLOOR.draw(rng)),
+        meshes.box((length, width + 1.0, 0.3), roof, (x, y, height)),
+        meshes.box((0.3, width, height), cladding, (hall.x[0] - 0.15, y, 0.0)),
+    ]
+    for along in np.arange(hall.x[0] + 3.0, hall.x[1], 6.0):
+        parts.append(meshes.box((0.2, width, 0.45), steel, (along, y, height - 0.45)))
+        parts += [
+            meshes.box((0.3, 0.3, height), steel, (along, side - out * 0.15, 0.0))
+            for side, out in zip(hall.y, (-1, 1), strict=True)
+        ]
+    parts += [
+        meshes.box((length, 0.3, height), cladding, (x, side + out * 0.15, 0.0))
+        for side, out in zip(hall.y, (-1, 1), strict=True)
+    ]
+    site.build(meshes.join(parts), straight=True, sheltered=True)
 
 
 def build_docks(
-    site: Site, rng: np.random.Generator, end: float, half: float, height: float, wall: Material
+    site: Site, rng: np.random.Generator, hall: Hall, height: float, leaves: bool
 ) -> None:
     """The end wall with three gates, the middle one perhaps open on a yard in daylight."""
-    box = (-BEHIND_M, -half - 1.0, -1.0), (end, half + 1.0, height + 0.3)
-    width, high, is_open = 3.0, 3.4, rng.random() < 0.45
-    site.indoor = Indoor(*box, ((-width / 2, 0.0), (width / 2, high)) if is_open else None)
-    beside = half - width / 2
-    for side in (-1, 1):
-        y = side * (half + width / 2) / 2
-        site.put(meshes.box((0.3, beside, height), wall), end + 0.15, y)
-        site.build(meshes.at(dock_door(rng, width), end - 0.02, side * 4.2, yaw=np.pi))
+    width, high, is_open = 3.0, 3.4, leaves or rng.random() < 0.45
+    opening = ((-width / 2, 0.0), (width / 2, high)) if is_open else None
+    site.indoor = hall.indoor(height + 0.3, opening, None)
+    wall, end = m.METAL.draw(rng), hall.x[1]
+    for side, low, outer in ((-1, hall.y[0], -width / 2), (1, width / 2, hall.y[1])):
+        part = meshes.box((0.3, outer - low, height), wall)
+        build_wall(site, part, end + 0.15, (low + outer) / 2)
+        door = meshes.at(dock_door(rng, width), end - 0.02, side * 4.2, yaw=np.pi)
+        site.build(door, straight=True)
     lintel = meshes.box((0.3, width, height - high), wall, (end + 0.15, 0.0, high))
-    site.build(lintel)
-    if is_open:
-        yard = (end, end + REACH_M), (-REACH_M, REACH_M)
-        # A little lower, so that it does not lie in one plane with the floor at the threshold.
-        site.build(meshes.patch(*yard, -0.01, m.ASPHALT.draw(rng)))
+    site.build(lintel, straight=True)
+    if leaves:
         return
-    site.build(meshes.box((0.1, width, high), wall, (end + 0.25, 0.0, 0.0)))
-    site.build(meshes.at(dock_door(rng, width), end + 0.1, 0.0, yaw=np.pi))
+    if is_open:
+        yard = (end, end + REACH_M), (hall.y[0] - REACH_M, hall.y[1] + REACH_M)
+        # A little lower, so that it does not lie in one plane with the floor at the threshold.
+        site.build(meshes.patch(*yard, -0.01, m.ASPHALT.draw(rng)), straight=True)
+        return
+    site.build(meshes.box((0.1, width, high), wall, (end + 0.25, 0.0, 0.0)), straight=True)
+    site.build(meshes.at(dock_door(rng, width), end + 0.1, 0.0, yaw=np.pi), straight=True)
 
 
 @meshes.thing
@@ -126,13 +151,16 @@ def floor_thing(rng: np.random.Generator) -> Mesh:
 
 def put_fork_lift(site: Site, rng: np.random.Generator, end: float, aisle: float) -> None:
     """Perhaps a fork lift in the aisle, coming, going or standing."""
-    if rng.random() < 0.35:
+    if rng.random() < 0.2:
         return
-    speed = rng.uniform(0.8, 3.0) if rng.random() < 0.7 else 0.0
-    x, yaw = site.travel_m + rng.uniform(4.0, 10.0), rng.integers(2) * np.pi
-    # 0.9 m is half of its width and some clearance.
-    offset = (aisle / 2 - 0.9) * rng.uniform(-0.6, 1.0)
-    site.put_moving(fork_lift(rng), Arc(Pose((min(x, end - 3.0), offset, 0.0), yaw), speed))
+    truck = fork_lift(rng)
+    for _ in range(TRIES):
+        speed = rng.uniform(0.8, 3.0) if rng.random() < 0.8 else 0.0
+        x, yaw = site.travel_m + rng.uniform(4.0, 14.0), rng.integers(2) * np.pi
+        # 0.9 m is half of its width and some clearance.
+        offset = (aisle / 2 - 0.9) * rng.uniform(-0.6, 1.0)
+        if put_driver(site, truck, Pose((min(x, end - 3.0), offset, 0.0), yaw), speed):
+            return
 
 
 def build_high_bays(site: Site, rng: np.random.Generator, end: float, height: float) -> None:
@@ -235,7 +263,7 @@ def pallet_jack(rng: np.random.Generator) -> Mesh:
 
 
 @meshes.thing
-def fork_lift(rng: np.random.Generator) -> Mesh:
+def fork_lift(rng: np.random.Generator) -> Mover:
     """A counterbalanced truck with mast, forks, overhead guard and driver, perhaps a load."""
     paint, dark, tyre = m.MACHINE_PAINT.draw(rng), m.DARK_METAL.draw(rng), m.TYRE.draw(rng)
     lift = rng.uniform(0.08, 0.4)
@@ -259,8 +287,8 @@ def fork_lift(rng: np.random.Generator) -> Mesh:
         *driver,
         meshes.box((1.3, 1.0, 0.06), dark, (-0.1, 0.0, 2.1)),
         meshes.box((0.08, 0.8, 0.5), dark, (1.0, 0.0, lift)),
-        *(wheel(x, side, 0.53, 0.28, tyre, paint) for x in (0.5, -0.7) for side in (-1, 1)),
     ]
     if rng.random() < 0.5:
         parts.append(meshes.at(load(rng), 1.55, 0.0, lift + 0.06))
-    return meshes.join(parts)
+    wheels = (axle(x, 0.53, 0.28, tyre, paint) for x in (0.5, -0.7))
+    return Mover((Rigid(meshes.join(parts)), *wheels))

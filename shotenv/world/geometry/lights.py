@@ -7,6 +7,8 @@ law; sky radiances and lamp intensities are assumed ranges.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from shotenv.world.geometry.materials import log_uniform
@@ -20,6 +22,9 @@ LOW_SUN_RAD = np.radians(15.0)
 """Elevation below which the sun counts as low."""
 DUSK_RADIANCE = 5e-3
 """Radiance of the sky below which lamps are lit, W m-2 sr-1."""
+TWILIGHT: Range = (20.0, 200.0)
+"""How much brighter than the night's the sky of a dusk is at first; assumed."""
+FASTEST_FADING_PER_S = 0.6
 BRIGHTEST_FACE = 2.0
 """Radiance at which lamp faces are capped, W m-2 sr-1: about a white wall in the sun."""
 
@@ -89,6 +94,38 @@ def night(rng: np.random.Generator) -> Light:
     sky = log_uniform(rng, (3e-5, 3e-4))
     lamps = ego_headlights(rng) if rng.random() < 0.75 else ()
     return Light(0.0, (0.0, 0.0, 1.0), sky, 1.5 * sky, lamps)
+
+
+def dusk(rng: np.random.Generator, night: Light, duration_s: float) -> Light:
+    """Twilight that falls to a night's darkness within a clip, or towards it.
+
+    Nature takes half an hour for it. Clips show in seconds what drives go through, but no faster
+    than `FASTEST_FADING_PER_S`, so that neighbouring frames still differ little.
+    """
+    brighter = log_uniform(rng, TWILIGHT)
+    fading = min(np.log(brighter) / duration_s, FASTEST_FADING_PER_S)
+    # In a short clip it does not get as dark as the night in which it ends otherwise.
+    return replace(
+        night,
+        sky_zenith=night.sky_zenith * brighter,
+        sky_horizon=night.sky_horizon * brighter,
+        fading_per_s=float(fading),
+    )
+
+
+def switched_on(rng: np.random.Generator, light: Light, duration_s: float) -> Light:
+    """The lamps of a dusk: street lamps come on all at once, the ego's when its driver thinks so.
+
+    Others who drive have theirs on.
+    """
+    street, own = rng.uniform(0.1, 0.8) * duration_s, rng.uniform(-0.3, 0.7) * duration_s
+    lamps = tuple(
+        lamp
+        if lamp.carrier is not None
+        else replace(lamp, on_s=float(own if lamp.rides else street))
+        for lamp in light.lamps
+    )
+    return replace(light, lamps=lamps)
 
 
 def is_dark(light: Light) -> bool:

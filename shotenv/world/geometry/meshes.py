@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields, replace
 from functools import cache, wraps
-from typing import ParamSpec
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 import trimesh
@@ -19,6 +19,8 @@ from shotenv.world.geometry.model import Mesh
 from shotenv.world.geometry.motion import Pose
 
 P = ParamSpec("P")
+Drawn = TypeVar("Drawn")
+"""A `Mesh` or a `Mover`: both have `kinds`."""
 Point = tuple[float, float, float]
 ORIGIN: Point = (0.0, 0.0, 0.0)
 _NEXT, _AFTER = [1, 2, 0], [2, 0, 1]
@@ -72,13 +74,13 @@ def join(meshes: Iterable[Mesh]) -> Mesh:
     )
 
 
-def thing(draw: Callable[P, Mesh]) -> Callable[P, Mesh]:
+def thing(draw: Callable[P, Drawn]) -> Callable[P, Drawn]:
     """Mark what `draw` makes as a thing of the kind that the function is named after."""
 
     @wraps(draw)
-    def drawn(*args: P.args, **kwargs: P.kwargs) -> Mesh:
-        mesh = draw(*args, **kwargs)
-        return replace(mesh, kinds=mesh.kinds | {draw.__name__})
+    def drawn(*args: P.args, **kwargs: P.kwargs) -> Drawn:
+        made: Any = draw(*args, **kwargs)
+        return replace(made, kinds=made.kinds | {draw.__name__})
 
     return drawn
 

@@ -6,7 +6,8 @@ band: irradiance W m-2, radiance W m-2 sr-1, radiant intensity W sr-1. No render
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -60,6 +61,10 @@ class MovingObject:
     motion: Motion
 
 
+SWITCHING_S = 0.8
+"""Time in which a lamp becomes bright; discharge lamps take longer, incandescent ones less."""
+
+
 @dataclass(frozen=True)
 class Lamp:
     """A small lamp that lights other things (a street lamp, a head light, a ceiling tube).
@@ -68,7 +73,7 @@ class Lamp:
     radius keeps it finite close by. `cutoff_cos` = -1 shines everywhere; otherwise the intensity
     falls smoothly to 0 at that cosine from `direction`. `rides` lamps move with the camera. A lamp
     with a `carrier` is fixed to that one of `World.moving`, in whose own coordinates its position
-    and direction are.
+    and direction are. It comes on at `on_s`, within `SWITCHING_S`.
     """
 
     position_m: tuple[float, float, float]
@@ -78,11 +83,16 @@ class Lamp:
     cutoff_cos: float = -1.0
     rides: bool = False
     carrier: int | None = None
+    on_s: float = -math.inf
+
+    def share_on(self, time_s: float) -> float:
+        """How much of its light a lamp gives at a time, 0 to 1."""
+        return min(1.0, max(0.0, (time_s - self.on_s) / SWITCHING_S))
 
 
 @dataclass(frozen=True)
 class Indoor:
-    """A roofed box that daylight enters through one opening at most, at its far end.
+    """A roofed box that daylight enters through openings at its ends, one at each at most.
 
     Renderers aim at the opening: daylight that has to find it by chance is noise.
 
@@ -92,11 +102,14 @@ class Indoor:
         Corners of the box, metres.
     opening : ((y, z), (y, z)) or None
         Lower and upper corner of the opening in the plane x = high[0].
+    entrance : ((y, z), (y, z)) or None
+        The same in the plane x = low[0].
     """
 
     low: tuple[float, float, float]
     high: tuple[float, float, float]
     opening: tuple[tuple[float, float], tuple[float, float]] | None
+    entrance: tuple[tuple[float, float], tuple[float, float]] | None = None
 
 
 @dataclass(frozen=True)
@@ -112,9 +125,11 @@ class Light:
     sky_zenith, sky_horizon : float
         Sky radiance overhead and at the horizon, W m-2 sr-1, linear in the sine of elevation.
     lamps : tuple of Lamp
-        At most `MAX_LAMPS`.
+        Any number; at an instant `MAX_LAMPS` of them shine.
     indoor : Indoor or None
         The roofed part of the world, if any.
+    fading_per_s : float
+        Rate at which sun and sky fall from time 0 on, as at dusk: by a factor e in 1 / rate.
     """
 
     sun_irradiance: float
@@ -123,10 +138,22 @@ class Light:
     sky_horizon: float
     lamps: tuple[Lamp, ...]
     indoor: Indoor | None = None
+    fading_per_s: float = 0.0
+
+    def at(self, time_s: float) -> Light:
+        """The light of an instant: sun and sky as bright as they are then."""
+        left = math.exp(-self.fading_per_s * time_s)
+        return replace(
+            self,
+            sun_irradiance=self.sun_irradiance * left,
+            sky_zenith=self.sky_zenith * left,
+            sky_horizon=self.sky_horizon * left,
+        )
 
 
 MAX_LAMPS = 16
-"""Most lamps of a world: renderers keep a table of this length, so that one kernel fits all."""
+"""Most lamps at an instant, those nearest to the camera: renderers keep a table of this length, so
+that one kernel fits all."""
 
 
 @dataclass(frozen=True)

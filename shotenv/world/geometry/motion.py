@@ -29,6 +29,13 @@ class Motion(Protocol):
         """Pose at `time_s`."""
 
 
+class Route(Motion, Protocol):
+    """A motion that knows the way it has covered, which wheels and legs go by."""
+
+    def way_m(self, time_s: float) -> float:
+        """Way along the path since time 0, metres; negative before it."""
+
+
 @dataclass(frozen=True)
 class Arc:
     """Constant speed on an arc: the pose at time t from the pose at time 0.
@@ -52,6 +59,10 @@ class Arc:
         moved = (x + chord * math.cos(heading), y + chord * math.sin(heading), z)
         start = self.start
         return Pose(moved, start.yaw_rad + turned, start.pitch_rad, start.roll_rad)
+
+    def way_m(self, time_s: float) -> float:
+        """Way along the arc since time 0, metres."""
+        return self.speed_m_s * time_s
 
 
 def ground_speed_m_s(motion: Motion, time_s: float) -> float:

@@ -1,4 +1,5 @@
 from . import (
+    animals as animals,
     buildings as buildings,
     cycles as cycles,
     furniture as furniture,
@@ -8,4 +9,4 @@ from . import (
     vehicles as vehicles,
 )
 from .heavy import cab as cab, nose_lamps as nose_lamps
-from .wheels import wheel as wheel
+from .wheels import axle as axle

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from shotenv.world.geometry import Mesh, materials as m, meshes
-from shotenv.world.things.wheels import wheel
+from shotenv.world.geometry import Mesh, Mover, Rigid, Wheels, materials as m, meshes
+from shotenv.world.things.wheels import axle
 
 
 @meshes.thing
 def lorry(
     rng: np.random.Generator, headlight_radiance: float = 0.0, tail_radiance: float = 0.0
-) -> Mesh:
+) -> Mover:
     """A cab before a box body or a tarpaulin, marked with retro-reflecting tape at its rear."""
     length, width, height = rng.uniform(6.0, 8.5), rng.uniform(2.2, 2.45), rng.uniform(2.9, 3.5)
     front, rear = length / 2, -length / 2
@@ -21,16 +21,16 @@ def lorry(
     radius = rng.uniform(0.40, 0.48)
     # Long ones carry their load on two axles at the rear.
     axles = (front - 0.8, rear + 1.3) if length < 7.0 else (front - 0.8, rear + 1.1, rear + 2.2)
-    return meshes.join(
+    body = meshes.join(
         [
             meshes.box((load_length, width, height - 1.05), load, (middle, 0.0, 1.05)),
             meshes.box((length - 0.4, 0.8, 0.35), m.DARK_METAL.draw(rng), (0.0, 0.0, 0.65)),
             cab(rng, front, width - 0.1),
-            *_wheels(rng, axles, width / 2, radius),
             nose_lamps(rng, front + 0.012, width, headlight_radiance),
             lorry_tail(rng, rear, width, height, tail_radiance),
         ]
     )
+    return Mover((Rigid(body), *_axles(rng, axles, width / 2, radius)))
 
 
 def cab(rng: np.random.Generator, front: float, width: float) -> Mesh:
@@ -88,17 +88,17 @@ def lorry_tail(
     )
 
 
-def _wheels(
-    rng: np.random.Generator, axles: tuple[float, ...], half: float, radius: float
-) -> list[Mesh]:
+def _axles(
+    rng: np.random.Generator, x: tuple[float, ...], half: float, radius: float
+) -> list[Wheels]:
     tyre, rim = m.TYRE.draw(rng), m.METAL.draw(rng)
-    return [wheel(x, side, half - 0.03, radius, tyre, rim) for x in axles for side in (-1, 1)]
+    return [axle(along, half - 0.03, radius, tyre, rim) for along in x]
 
 
 @meshes.thing
 def bus(
     rng: np.random.Generator, headlight_radiance: float = 0.0, tail_radiance: float = 0.0
-) -> Mesh:
+) -> Mover:
     """A town bus: a low body, a band of clear windows between posts, seats inside, a roof."""
     length, width = rng.uniform(8.0, 10.5), rng.uniform(2.35, 2.5)
     front, half, sill, top = length / 2, width / 2, 1.25, 2.75
@@ -120,7 +120,7 @@ def bus(
                        glass)
         for y in (0.03 - half, half - 0.03)
     ]  # fmt: skip
-    return meshes.join(
+    body = meshes.join(
         [
             meshes.box((length, width, sill - 0.3), paint, (0.0, 0.0, 0.3)),
             meshes.box((length, width, 0.3), roof, (0.0, 0.0, top)),
@@ -129,11 +129,11 @@ def bus(
             *sides,
             meshes.front((-half + 0.1, half - 0.1), (sill, top), front, glass),
             meshes.back((-half + 0.1, half - 0.1), (sill, top), -front, glass),
-            *_wheels(rng, (-0.28 * length, 0.28 * length), half, 0.46),
             nose_lamps(rng, front + 0.012, width, headlight_radiance),
             bus_tail(rng, -front - 0.012, half, tail_radiance),
         ]
     )
+    return Mover((Rigid(body), *_axles(rng, (-0.28 * length, 0.28 * length), half, 0.46)))
 
 
 def bus_tail(rng: np.random.Generator, x: float, half: float, radiance: float) -> Mesh:

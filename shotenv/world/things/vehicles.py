@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shotenv.world.geometry import Material, Mesh, materials as m, meshes
+from shotenv.world.geometry import Material, Mesh, Mover, Rigid, Wheels, materials as m, meshes
 from shotenv.world.things import cycles, heavy
-from shotenv.world.things.wheels import wheel
+from shotenv.world.things.wheels import axle
 
 Profile = list[tuple[float, float]]
 
@@ -55,7 +55,7 @@ def van_shape(rng: np.random.Generator) -> CarShape:
     return CarShape(length, width, body, cabin, 0.95 * width, rng.uniform(0.32, 0.36))
 
 
-def traffic(rng: np.random.Generator, headlight: float = 0.0, tail: float = 0.0) -> Mesh:
+def traffic(rng: np.random.Generator, headlight: float = 0.0, tail: float = 0.0) -> Mover:
     """Any motor vehicle of the traffic; its lamps' faces have these radiances, W m-2 sr-1."""
     draw = (car, van, heavy.lorry, heavy.bus, cycles.motorcycle)[
         rng.choice(5, p=(0.64, 0.12, 0.10, 0.06, 0.08))
@@ -65,13 +65,13 @@ def traffic(rng: np.random.Generator, headlight: float = 0.0, tail: float = 0.0)
 
 def parked_car(rng: np.random.Generator) -> Mesh:
     """A car or, less often, a van, with its lamps off."""
-    return van(rng) if rng.random() < 0.18 else car(rng)
+    return (van(rng) if rng.random() < 0.18 else car(rng)).at_rest
 
 
 @meshes.thing
 def car(
     rng: np.random.Generator, headlight_radiance: float = 0.0, tail_radiance: float = 0.0
-) -> Mesh:
+) -> Mover:
     """A car with windows to look through, wheels, lamps and retro-reflecting number plates.
 
     Parameters
@@ -84,13 +84,14 @@ def car(
     # Glass to look through, with seats behind it: two surfaces in one pixel, as on real roads.
     glass = (m.CLEAR_GLASS if rng.random() < 0.7 else m.TINTED_GLASS).draw(rng)
     inside = [hollow_cabin(shape, paint, glass), seats(rng, shape)]
-    return meshes.join([*inside, chassis(rng, shape, paint, headlight_radiance, tail_radiance)])
+    body = [*inside, chassis(rng, shape, paint, headlight_radiance, tail_radiance)]
+    return Mover((Rigid(meshes.join(body)), *wheels(rng, shape)))
 
 
 @meshes.thing
 def van(
     rng: np.random.Generator, headlight_radiance: float = 0.0, tail_radiance: float = 0.0
-) -> Mesh:
+) -> Mover:
     """A delivery van, mostly without windows behind the front seats; parameters as of `car`."""
     shape, paint = van_shape(rng), car_paint(rng)
     cargo = meshes.extrude(shape.cabin, shape.cabin_width, paint)
@@ -99,19 +100,17 @@ def van(
         meshes.polygon(meshes.inset(outline, 0.16, 0.01), m.GLASS.draw(rng))
         for outline in outlines(shape, rear_share=0.66)[: 2 if rng.random() < 0.6 else 6]
     )
-    return meshes.join(
-        [cargo, panes, chassis(rng, shape, paint, headlight_radiance, tail_radiance)]
-    )
+    body = [cargo, panes, chassis(rng, shape, paint, headlight_radiance, tail_radiance)]
+    return Mover((Rigid(meshes.join(body)), *wheels(rng, shape)))
 
 
 def chassis(
     rng: np.random.Generator, shape: CarShape, paint: Material, headlight: float, tail: float
 ) -> Mesh:
-    """Lower body, wheels, lamps and plates."""
+    """Lower body, lamps and plates."""
     return meshes.join(
         [
             meshes.extrude(shape.body, shape.width, paint),
-            wheels(rng, shape),
             front_trim(rng, shape, headlight),
             rear_trim(rng, shape, tail),
         ]
@@ -174,16 +173,14 @@ def _between(a: tuple[float, float], b: tuple[float, float], share: float) -> tu
     return a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
 
 
-def wheels(rng: np.random.Generator, shape: CarShape) -> Mesh:
-    """Four tyres with bright rims."""
+def wheels(rng: np.random.Generator, shape: CarShape) -> list[Wheels]:
+    """Two axles of tyres with bright rims."""
     tyre, rim = m.TYRE.draw(rng), m.METAL.draw(rng)
     # A wheelbase of 58 % of the length is usual.
-    radius, axle = shape.wheel_radius, 0.29 * shape.length
-    return meshes.join(
-        wheel(x, side, shape.width / 2, radius, tyre, rim)
-        for x in (-axle, axle)
-        for side in (-1, 1)
-    )
+    return [
+        axle(x, shape.width / 2, shape.wheel_radius, tyre, rim)
+        for x in (-0.29 * shape.length, 0.29 * shape.length)
+    ]
 
 
 def front_trim(rng: np.random.Generator, shape: CarShape, radiance: float) -> Mesh:

@@ -133,18 +133,47 @@ def test_rows_of_nested_values():
     assert concatenate([part, part]).driver_energy_j.tolist() == [13.0, 11.0] * 2
 
 
+def runs_of(frames):
+    """Consecutive bank frames of a drive, one list for each clip that it plays."""
+    runs = [[frames[0]]]
+    for before, frame in pairwise(frames):
+        if frame == before + 1 and frame % 4:
+            runs[-1].append(frame)
+        else:
+            runs.append([frame])
+    return runs
+
+
 def test_a_drive_plays_whole_clips_of_its_split(problem):
     clips = problem.bank.splits("train")
     frames = chain_clips(clips, 101, generator=torch.Generator().manual_seed(0)).tolist()
     assert len(frames) == 101
-    order = []
-    for start in range(0, 100, 4):
-        run = frames[start : start + 4]
-        assert run == list(range(run[0], run[0] + len(run)))
-        order.append(problem.bank.clip_of(run[0]))
+    assert {clip.frames for clip in clips} == {4}
+    assert {clip.start % 4 for clip in clips} == {0}
+    runs = runs_of(frames)
+    # From the middle of the first clip and to the middle of the last one; all others whole.
+    assert all(run[0] % 4 == 0 for run in runs[1:])
+    assert all(run[-1] % 4 == 3 for run in runs[:-1])
+    order = [problem.bank.clip_of(run[0]) for run in runs]
     assert all(clip.split == "train" for clip in order)
     assert all(a is not b for a, b in pairwise(order))
     assert len({clip.name for clip in order}) == len(clips)
+
+
+def test_drives_are_cut_at_different_steps(problem):
+    clips = problem.bank.splits("train")
+    first = [
+        len(
+            runs_of(chain_clips(clips, 9, generator=torch.Generator().manual_seed(seed)).tolist())[
+                0
+            ]
+        )
+        for seed in range(40)
+    ]
+    # The first clip has four frames: drives begin at each of them.
+    assert set(first) == {1, 2, 3, 4}
+    again = chain_clips(clips, 9, generator=torch.Generator().manual_seed(7)).tolist()
+    assert again == chain_clips(clips, 9, generator=torch.Generator().manual_seed(7)).tolist()
 
 
 def rows_equal(one, many, row):

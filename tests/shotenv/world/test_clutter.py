@@ -38,7 +38,7 @@ def test_distances_are_those_of_rooms_halls_and_open_ground(seen):
     below = {far: np.mean(distance < far) for far in (2.0, 6.0, 15.0, 30.0, 60.0)}
     assert below[2.0] > 0.03
     assert below[6.0] < 0.8
-    assert below[15.0] < 0.95
+    assert below[15.0] < 0.97
     assert below[30.0] < 0.99
     assert below[60.0] > 0.98
 

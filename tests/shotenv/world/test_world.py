@@ -9,15 +9,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from drawn_worlds import CLIP, EVERY, SPARSE, arrays_of, drawn_worlds, plain_box
+from drawn_worlds import (
+    CLIP,
+    EVERY,
+    SPARSE,
+    arrays_of,
+    drawn_worlds,
+    movers_of,
+    plain_box,
+    route_of,
+)
 
 from shotenv.config.bank import WorldConfig
 from shotenv.config.families import FAMILIES
 from shotenv.world.draw import draw_world
 from shotenv.world.geometry import lights, materials as m, meshes
-from shotenv.world.geometry.model import MAX_LAMPS
-from shotenv.world.geometry.motion import Arc, Pose
-from shotenv.world.geometry.site import MAX_TRIANGLES, Site, footprints
+from shotenv.world.geometry.motion import Arc, Pose, ground_speed_m_s
+from shotenv.world.geometry.mover import Mover, Rigid, posed
+from shotenv.world.geometry.site import MAX_TRIANGLES, STRETCH_M, Site, below, footprints
 
 UNAMBIGUOUS_M = 6.2457
 
@@ -32,7 +41,7 @@ def duration_s(config):
 
 
 def corners_at(world, time_s):
-    placed = [meshes.place(thing.mesh, thing.motion.at(time_s)) for thing in world.moving]
+    placed = [posed(thing.mesh, thing.motion.at(time_s)) for thing in world.moving]
     return np.concatenate([world.static.corners, *(mesh.corners for mesh in placed)])
 
 
@@ -76,9 +85,8 @@ def digest(world):
     """Every number of a world, hashed."""
     parts = [world.static, *(thing.mesh for thing in world.moving)]
     arrays = [array.tobytes() for mesh in parts for array in arrays_of(mesh)]
-    rest = repr(
-        (sorted(world.kinds), world.light, world.ego, [thing.motion for thing in world.moving])
-    ).encode()
+    poses = [thing.motion.at(time) for thing in world.moving for time in (-0.2, 0.0, 0.7, 1.9)]
+    rest = repr((sorted(world.kinds), world.light, world.ego, poses)).encode()
     return hashlib.sha256(b"".join([*arrays, rest])).hexdigest()
 
 
@@ -135,7 +143,6 @@ def test_light_is_physical(drawn):
         assert np.linalg.norm(light.sun_direction) == pytest.approx(1.0, abs=1e-9)
         assert 0 <= light.sun_irradiance <= lights.G173_IRRADIANCE
         assert light.sun_direction[2] >= np.sin(np.radians(2.5)) - 1e-9
-        assert len(light.lamps) <= MAX_LAMPS
         for lamp in light.lamps:
             assert lamp.intensity_w_sr > 0
             assert np.linalg.norm(lamp.direction) == pytest.approx(1.0, abs=1e-3)
@@ -147,7 +154,8 @@ def test_families_have_their_light(drawn):
         if world.family in ("sunny_road", "overcast_street", "garage", "warehouse", "night_road"):
             assert (light.sun_irradiance > 0) == (world.family == "sunny_road")
         if world.family == "night_road":
-            assert light.sky_zenith < 1e-3
+            # At dusk it is brighter at first.
+            assert light.sky_zenith < (0.1 if light.fading_per_s else 1e-3)
         if world.family in ("garage", "tunnel", "night_road", "warehouse"):
             assert light.lamps
 
@@ -159,24 +167,28 @@ def test_sun_falls_with_elevation():
     assert irradiance[-1] == pytest.approx(lights.G173_IRRADIANCE, rel=1e-3)
 
 
-def test_triangle_budget(drawn):
-    for _, world in drawn:
-        # Ground and other things that are built rather than placed may go a little over it.
-        assert len(corners_at(world, 0.0)) <= MAX_TRIANGLES + 300
+def test_triangle_budget_of_a_stretch():
+    site = Site(Arc(Pose((0.0, 0.0, 1.0)), 10.0), 12.0)
+    post = meshes.join([plain_box((0.1, 0.1, 1.0))] * 40)
+    for x in np.arange(0.5, 120.0, 0.5):
+        site.put(post, x, 3.0)
+    stands = np.array([mesh.corners[..., 0].mean() for mesh in site.static])
+    for first in (0.0, STRETCH_M):
+        count = ((stands >= first) & (stands < first + STRETCH_M)).sum()
+        # One more would have gone over it.
+        assert MAX_TRIANGLES - len(post.corners) < count * len(post.corners) <= MAX_TRIANGLES
 
 
 def test_speed_is_within_the_configuration(drawn):
-    for config, world in drawn:
-        assert config.speed_m_s[0] <= world.ego.speed_m_s <= config.speed_m_s[1]
-    fast = draw_world("garage", 0, WorldConfig(speed_m_s=(12.0, 13.0)))
-    assert 12.0 <= fast.ego.speed_m_s <= 13.0
-
-
-def test_long_clips_stay_in_their_world():
-    config = WorldConfig(frames_per_clip=256)
-    for family in EVERY:
-        world = draw_world(family, 1, config)
-        assert world.ego.speed_m_s * duration_s(config) <= 90.0 + 1e-6
+    worlds = [*drawn]
+    for limits in ((12.0, 13.0), (0.0, 1.0)):
+        config = WorldConfig(speed_m_s=limits)
+        worlds += [(config, draw_world(family, 0, config)) for family in EVERY]
+    for config, world in worlds:
+        for time in np.linspace(0.0, duration_s(config), 9):
+            speed = abs(ground_speed_m_s(world.ego, time))
+            # Within a lane the ego swings aside, on which it goes a per mille faster.
+            assert config.speed_m_s[0] * 0.99 <= speed <= config.speed_m_s[1] * 1.01
 
 
 def test_nothing_comes_near_the_camera(drawn):
@@ -190,26 +202,36 @@ def test_nothing_comes_near_the_camera(drawn):
             assert np.linalg.norm(nearest - camera, axis=1).min(initial=np.inf) > 0.4
 
 
-def test_camera_starts_at_the_origin(drawn):
+def test_camera_is_at_the_height_of_a_car(drawn):
     for _, world in drawn:
-        x, y, z = world.ego.start.position_m
-        assert (x, y) == (0.0, 0.0)
-        assert 0.6 <= z <= 1.2
+        # Vibration adds some millimetres.
+        assert 0.58 <= world.ego.at(0.0).position_m[2] <= 1.22
 
 
 def test_most_worlds_have_something_moving(drawn):
-    moving = [any(thing.motion.speed_m_s > 0 for thing in world.moving) for _, world in drawn]
+    def goes(motion, until_s):
+        ways = [motion.at(time).position_m[:2] for time in np.linspace(0.0, until_s, 5)]
+        return np.ptp(ways, axis=0).max() > 0.2
+
+    moving = [
+        any(goes(thing.motion, duration_s(config)) for thing in world.moving)
+        for config, world in drawn
+    ]
     assert np.mean(moving) > 0.7
 
 
 def test_moving_things_stand_on_the_ground(drawn):
     for config, world in drawn:
-        for thing in world.moving:
-            assert thing.mesh.corners[..., 2].min() == pytest.approx(0.0, abs=5e-3)
+        for movers in movers_of(world):
+            route = route_of(movers[0].motion)
             for time in (0.0, duration_s(config)):
-                above = np.add(thing.motion.at(time).position_m, (0.0, 0.0, 0.05))
+                placed = [posed(piece.mesh, piece.motion.at(time)) for piece in movers]
+                lowest = min(float(mesh.corners[..., 2].min()) for mesh in placed)
+                above = np.add(route.at(time).position_m, (0.0, 0.0, 0.05))
                 fall = cast(world.static.corners, above, np.array([[0.0, 0.0, -1.0]])).min()
                 assert fall == pytest.approx(0.05, abs=0.015)
+                # Who runs may be in the air.
+                assert -0.03 < lowest - (above[2] - fall) < 0.2
 
 
 def test_no_two_faces_fight_for_the_same_place(views):
@@ -262,8 +284,9 @@ def test_site_keeps_the_way_and_the_ground_free():
     assert not site.put(plain_box(), 5.0, 0.0)
     assert site.put(plain_box(), 5.0, 3.0)
     assert not site.put(plain_box(), 5.5, 3.5)
-    assert not site.put_moving(plain_box(), Arc(Pose((5.0, -6.0, 0.0), np.pi / 2), 12.0))
-    assert site.put_moving(plain_box(), Arc(Pose((5.0, -6.0, 0.0), -np.pi / 2), 12.0))
+    box = Mover((Rigid(plain_box()),))
+    assert not site.put_moving(box, Arc(Pose((5.0, -6.0, 0.0), np.pi / 2), 12.0))
+    assert site.put_moving(box, Arc(Pose((5.0, -6.0, 0.0), -np.pi / 2), 12.0))
     assert len(site.static) == 1
     assert len(site.moving) == 1
 
@@ -272,7 +295,7 @@ def test_a_slanting_panel_takes_the_ground_below_all_of_it_that_is_low():
     """Of its four corners only those at the foot are lower than the headroom of 2 m."""
     corners = [(0.0, -1.0, 0.0), (3.0, -1.0, 4.0), (3.0, 1.0, 4.0), (0.0, 1.0, 0.0)]
     panel = meshes.polygon(corners, m.Material(0.2, 0.3))
-    taken = footprints(panel, [Pose((0.0, 0.0, 0.0))])
+    taken = footprints(below(panel.corners, 2.0), [Pose((0.0, 0.0, 0.0))])
     assert taken[0].tolist() == [[0.0, -1.0], [1.5, 1.0]]
 
 
@@ -294,7 +317,7 @@ def test_site_lets_crowns_hang_over_and_rooms_end():
     [
         ("moon", 0, CLIP, "family is 'moon'"),
         ("garage", -1, CLIP, "seed is -1"),
-        ("garage", 0, WorldConfig(speed_m_s=(10, 15), frames_per_clip=256), "speed_m_s"),
+        ("garage", 0, WorldConfig(speed_m_s=(10, 15), frames_per_clip=2048), "speed_m_s"),
     ],
 )
 def test_bad_arguments_are_named(family, seed, config, named):

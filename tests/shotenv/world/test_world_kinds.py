@@ -5,7 +5,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from drawn_worlds import CLIP, EVERY, arrays_of, drawn_worlds
+from drawn_worlds import CLIP, EVERY, arrays_of, drawn_worlds, movers_of, route_of
 
 from shotenv.config.families import FAMILIES, TRAINING_FAMILIES, Family
 from shotenv.config.reader import find_config, read_config
@@ -14,6 +14,8 @@ from shotenv.sensor.electrons import electrons_per_radiance_second
 from shotenv.world.draw import draw_world
 from shotenv.world.families.settings import SETTINGS
 from shotenv.world.geometry import lights, materials as m, meshes, weather
+from shotenv.world.geometry.motion import rotation
+from shotenv.world.geometry.mover import posed
 from shotenv.world.things import furniture
 
 
@@ -154,14 +156,18 @@ def test_shares_of_the_light_stay_within_one(drawn):
 
 def test_moving_vehicles_carry_their_head_lights(drawn):
     carried = [
-        (world.moving[lamp.carrier], lamp)
+        (pieces, lamp)
         for _, world in drawn
         for lamp in world.light.lamps
-        if lamp.carrier is not None
+        for pieces in movers_of(world)
+        if lamp.carrier is not None and world.moving[lamp.carrier] is pieces[0]
     ]
     assert carried
-    for thing, lamp in carried:
-        nose, beside = thing.mesh.corners[..., 0].max(), thing.mesh.corners[..., 1].max()
+    for pieces, lamp in carried:
+        body = route_of(pieces[0].motion).at(0.0)
+        corners = [posed(piece.mesh, piece.motion.at(0.0)).corners for piece in pieces]
+        own = (np.concatenate(corners) - body.position_m) @ rotation(body)
+        nose, beside = own[..., 0].max(), own[..., 1].max()
         assert nose < lamp.position_m[0] < nose + 0.3
         assert abs(lamp.position_m[1]) < beside
         assert lamp.direction[0] > 0.9
@@ -172,7 +178,9 @@ def test_dark_worlds_alone_have_their_street_lamps_on(drawn):
     # Lamps of clutter burn at any hour.
     outdoors = [w for _, w in drawn if w.light.indoor is None and w.family != "clutter"]
     for light, kinds in ((w.light, w.kinds) for w in outdoors):
-        dark, posts = lights.is_dark(light), {"lamp_post", "light_tower"} & kinds
+        # At dusk lamps are there, and come on within the clip.
+        dark = lights.is_dark(light) or light.fading_per_s > 0
+        posts = {"lamp_post", "light_tower"} & kinds
         assert dark or not light.lamps
         assert any(lamp.position_m[2] > 3.0 for lamp in light.lamps) == bool(dark and posts)
         lit[dark] += bool(posts)
