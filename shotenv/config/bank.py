@@ -32,6 +32,9 @@ class CameraConfig(Section):
     samples_per_pixel: int = Field(4, ge=1, description="camera rays per pixel and instant")
     gray_instants: int = Field(4, ge=1, le=16, description="instants that make the gray image")
     bounces: int = Field(2, ge=1, le=8, description="surface hits of a light path")
+    gray_filter_m: NonNegative = Field(
+        0.3, description="reach of the gray light's filter along a plane, m; 0 filters nothing"
+    )
     emission: EmissionConfig = EmissionConfig()
 
     @property

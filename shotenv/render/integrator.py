@@ -10,8 +10,6 @@ What a mirror throws on a surface that is seen directly (a caustic) is left out.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import reduce
-from operator import add
 from typing import Any
 
 import drjit as dr
@@ -20,6 +18,7 @@ import numpy as np
 
 from shotenv.config import CameraConfig
 from shotenv.render.instants import Instants
+from shotenv.render.irradiance_filter import SoftLight, filtered
 from shotenv.render.laser_light import (
     POINTS,
     POINTS_PER_PATH,
@@ -31,8 +30,16 @@ from shotenv.render.laser_light import (
 from shotenv.render.light import PassiveLight
 from shotenv.render.modulation import FUNDAMENTAL, Harmonics, Modulation
 from shotenv.render.pinhole import Pinhole
-from shotenv.render.sampling import Lanes, Sampler
-from shotenv.render.surfaces import REACH_M, SURFACE_OFFSET_M, Hit, Scene, Surroundings, posed
+from shotenv.render.sampling import Lanes, Sampler, pixel_sums
+from shotenv.render.surfaces import (
+    REACH_M,
+    Hit,
+    Onward,
+    Scene,
+    Surroundings,
+    chances,
+    posed,
+)
 from shotenv.world.geometry import World
 
 VIEW_RAYS = 3
@@ -96,8 +103,9 @@ def trace(
     scene = Scene(surroundings, posed(world, surroundings.faces, instants.times_s, camera.bounces))
     sampler = Sampler(lanes, instants, camera, seed=seed)
     points = LitPoints.shone_on(scene, eye, instants, seed) if camera.bounces > 1 else None
-    gathered = _follow(scene, sources, points, lanes, camera.bounces, sampler)
-    return _collect(gathered, _true_distance(scene, eye, len(instants), camera), camera)
+    gathered = _follow(scene, sources, points, lanes, camera, sampler)
+    distance_m = _true_distance(scene, eye, len(instants), camera)
+    return _collect(gathered, distance_m, instants, camera)
 
 
 @dataclass(frozen=True)
@@ -119,6 +127,16 @@ class _Gathered:
     ambient: Any
     active: Any
     correlation: Any
+    soft: Any
+    first: Hit
+
+    def add_ambient(self, radiance, soft=False) -> None:
+        """Add passive light; `soft` is what its filter may average with that of neighbours."""
+        if self.soft is None:
+            self.ambient += radiance
+        else:
+            self.ambient += dr.select(soft, 0, radiance)
+            self.soft += dr.select(soft, radiance, 0)
 
     def add_active(self, radiance, path_m) -> None:
         """Add laser light that came a way of `path_m` metres."""
@@ -126,58 +144,40 @@ class _Gathered:
         self.correlation += radiance * self.modulation.at(path_m)
 
 
-@dataclass(frozen=True)
-class _Onward:
-    """How a light path goes on from a surface, and what it keeps of its light."""
+@dataclass
+class _Path:
+    """Where a light path from the camera is, and what it keeps of the light that it meets there."""
 
-    start: Any
+    instant: Any
+    hit: Hit
     direction: Any
-    kept: Any
-    scatters: Any
-    passes: Any
-    number: Any
-    """The random number that chose, stretched back to [0, 1)."""
+    walked_m: Any
+    seeks_sky: Any
+    """Whether the sky is counted where the way onward meets nothing."""
+    throughput: Any
+    way_back: Any
+    """Share of the laser's light on the way that the camera looks; 0 once that has scattered."""
+    bent: Any
+    """Whether a mirror or a diffuse surface lies behind, so that the laser shines on the surface by
+    another way than the camera looks."""
+    soft: Any
+    """Whether the first surface has scattered: what comes then changes little between pixels."""
+    found: Any
+    """Density of having scattered to the surface, per its area: of the laser's two ways to it one;
+    infinite where the path has not scattered."""
 
-    @classmethod
-    def drawn(cls, hit: Hit, direction, number, sample) -> _Onward:
-        """Choose among the shares of the surface by `number`, a diffuse direction by `sample`."""
-        mirror, clear, diffuse = _chances(hit)
-        mirrors = number < mirror
-        passes = ~mirrors & (number < mirror + clear)
-        scatters = ~mirrors & ~passes
-        scattered = mi.Frame3f(hit.normal).to_world(mi.warp.square_to_cosine_hemisphere(sample))
-        mirrored = direction - 2 * dr.dot(direction, hit.normal) * hit.normal
-        # One number serves this choice and the lamp's: within its share it is uniform again once
-        # that share is stretched to [0, 1).
-        below = dr.select(mirrors, 0, dr.select(passes, mirror, mirror + clear))
-        chance = dr.select(mirrors, mirror, dr.select(passes, clear, diffuse))
-        share = dr.select(mirrors, hit.mirror, dr.select(passes, hit.clear, hit.diffuse))
-        return cls(
-            start=dr.select(passes, dr.fma(direction, SURFACE_OFFSET_M, hit.point), hit.leave),
-            direction=dr.select(passes, direction, dr.select(mirrors, mirrored, scattered)),
-            kept=dr.select(scatters, hit.albedo, 1) * share / chance,
-            scatters=scatters,
-            passes=passes,
-            number=(number - below) / chance,
+    def arrive(self, scene: Scene, onward: Onward) -> None:
+        """Go on to the next surface."""
+        previous = self.hit
+        self.bent |= ~onward.passes
+        self.way_back *= dr.select(
+            onward.scatters, 0, dr.select(onward.passes, previous.clear, previous.mirror)
         )
-
-
-def _chances(hit: Hit):
-    """Chances of going on mirrored, straight through, and diffusely; their sum is 1.
-
-    Whole quarters, so that of four samples always as many go each way. Half of them or more go on
-    mirrored or straight through where a surface does so besides scattering: what a wet road
-    mirrors is bright and sharp, what it scatters dim and smooth, so that chances in proportion to
-    the shares would leave the first to luck.
-    """
-    mirrors, clears, scatters = hit.mirror > 0, hit.clear > 0, hit.diffuse > 0
-    both = mirrors & clears
-    most = both | (hit.mirror + hit.clear > hit.diffuse)
-    straight = dr.select(scatters, dr.select(most, 0.75, 0.5), 1)
-    straight = dr.select(mirrors | clears, straight, 0)
-    lesser = dr.select(both, 0.25, 0)
-    mirror = dr.select(mirrors & (~clears | (hit.mirror > hit.clear)), straight - lesser, lesser)
-    return mirror, straight - mirror, 1 - straight
+        self.hit = hit = scene.hit(onward.start, self.direction, self.instant, previous.valid)
+        self.walked_m += dr.norm(hit.point - previous.point)
+        *_, diffuse = chances(previous)
+        density = density_by_scattering(previous, diffuse, hit.point, hit.normal)
+        self.found = dr.select(onward.scatters, density, dr.inf)
 
 
 def _follow(
@@ -185,98 +185,128 @@ def _follow(
     sources: _Sources,
     points: LitPoints | None,
     lanes: Lanes,
-    bounces: int,
+    camera: CameraConfig,
     sampler: Sampler,
 ) -> _Gathered:
     """Walk every lane's path from the camera, adding the light of each surface hit.
 
     `points` are needed where paths have more than one surface.
     """
-    passive, instant = sources.passive, lanes.instant
-    eye = sources.eye
+    passive, instant, bounces = sources.passive, lanes.instant, camera.bounces
     place, *further = sampler.in_pixel(VIEW_RAYS)
-    origin, direction = eye.rays(lanes, place)
-    intensity, share = eye.intensity(direction, instant), 1 / (1 + len(further))
+    origin, direction = sources.eye.rays(lanes, place)
+    intensity = sources.eye.intensity(direction, instant)
     hit = scene.hit(origin, direction, instant, mi.Bool(True), coherent=True)
     light = _Gathered(
         modulation=sources.modulation,
         ambient=dr.select(sources.passive_on & ~hit.valid, passive.sky(direction), 0),
         active=mi.Float(0),
         correlation=mi.Float(0),
+        soft=mi.Float(0) if camera.gray_filter_m else None,
+        first=hit,
     )
+    share = 1 / (1 + len(further))
     for place in further:
         _add_first_return(light, scene, sources, lanes, place, share)
-    throughput, walked_m = mi.Float(1), hit.distance_m
-    # Share of the laser's light on the way that the camera looks; 0 once that way has scattered.
-    # `bent`: a mirror or a diffuse surface lies behind, so that the laser shines on the next one
-    # by another way than the camera looks. `seeks_sky`: a ray that meets nothing sees the sky,
-    # which no aimed ray has counted already.
-    way_back, bent, seeks_sky = mi.Float(1), mi.Bool(False), sources.passive_on
-    # Density of having scattered to the surface, per its area: of the laser's two ways to it one.
-    found = mi.Float(dr.inf)
+    path = _Path(
+        instant,
+        hit,
+        direction,
+        hit.distance_m,
+        seeks_sky=sources.passive_on,
+        throughput=mi.Float(1),
+        way_back=mi.Float(1),
+        bent=mi.Bool(False),
+        soft=mi.Bool(False),
+        found=mi.Float(dr.inf),
+    )
     # A Python loop: each bounce is traced into the one kernel, which knows the first and the last.
     for bounce in range(bounces):
-        laser_on, passive_on = hit.valid & sources.laser_on, hit.valid & sources.passive_on
-        returned = along_view(hit, intensity, direction, walked_m)
-        returned = dr.select(laser_on, throughput * way_back * returned, 0)
-        if bounce == 0:
-            returned *= share
-        light.add_active(returned, 2 * walked_m)
-        if bounce > 0:
-            lit = laser_on & bent
-            radiance, leg_m = straight(scene, eye, hit, instant, lit, found)
-            light.add_active(throughput * radiance, walked_m + leg_m)
-        if points is not None and bounce + 1 < bounces:
-            chosen = sampler.next_block(POINTS_PER_PATH, POINTS), sampler.next_1d()
-            *_, diffuse = _chances(hit)
-            active, correlation = points.light(
-                scene, eye, hit, diffuse, walked_m, instant, light.modulation, chosen, laser_on
-            )
-            light.active += dr.select(laser_on, throughput * active, 0)
-            light.correlation += dr.select(laser_on, throughput * correlation, 0)
-        # Faces of lamps glow for the camera and its mirrors alone: what they shine on others is
-        # the `Lamp`'s, and would be counted twice.
-        glow = dr.select(passive_on & (way_back > 0), hit.emission, 0)
-        light.ambient += throughput * glow
-
-        # Every lane draws all numbers at each surface, used or not, so that lanes stay in step.
-        aim, which = sampler.next_2d(), sampler.next_1d()
-        number, sample = sampler.next_choice(), sampler.next_2d()
-        onward = _Onward.drawn(hit, direction, number, sample)
-        if bounce == 0:
-            aimed = ~passive.sky_is_aimed_at(hit)
-            sky = passive.sky_irradiance(
-                scene, hit, instant, sampler.next_points(SKY_RAYS), passive_on & aimed
-            )
-            light.ambient += sky * hit.diffuse * hit.albedo * dr.inv_pi
-        numbers = aim, which, onward.number
-        irradiance = passive.irradiance(scene, hit, instant, numbers, passive_on)
-        # The surface reflects to the camera whatever way the path goes on.
-        light.ambient += throughput * irradiance * hit.diffuse * hit.albedo * dr.inv_pi
-        throughput *= onward.kept
-        seeks_sky = passive_on & dr.select(
+        first, last = bounce == 0, bounce + 1 == bounces
+        laser_on = path.hit.valid & sources.laser_on
+        returned = along_view(path.hit, intensity, path.direction, path.walked_m)
+        returned = dr.select(laser_on, path.throughput * path.way_back * returned, 0)
+        light.add_active(returned * (share if first else 1), 2 * path.walked_m)
+        if not first:
+            lit = laser_on & path.bent
+            radiance, leg_m = straight(scene, sources.eye, path.hit, instant, lit, path.found)
+            light.add_active(path.throughput * radiance, path.walked_m + leg_m)
+        if points is not None and not last:
+            _add_lit_points(light, scene, sources, points, path, sampler)
+        onward = _add_passive(light, scene, sources, path, sampler, first=first)
+        # Where a surface scatters, rays may have been aimed at the sky; from the first some were.
+        seeks_sky = dr.select(
             onward.scatters,
-            ~passive.sky_is_aimed_at(hit) & (bounce > 0),
-            seeks_sky | ~onward.passes,
+            mi.Bool(False) if first else ~passive.sky_is_aimed_at(path.hit),
+            path.seeks_sky | ~onward.passes,
         )
-        direction = onward.direction
-        if bounce + 1 < bounces:
-            bent |= ~onward.passes
-            way_back *= dr.select(
-                onward.scatters, 0, dr.select(onward.passes, hit.clear, hit.mirror)
-            )
-            previous, hit = hit, scene.hit(onward.start, direction, instant, hit.valid)
-            walked_m += dr.norm(hit.point - previous.point)
-            *_, diffuse = _chances(previous)
-            density = density_by_scattering(previous, diffuse, hit.point, hit.normal)
-            found = dr.select(onward.scatters, density, dr.inf)
-            free = dr.select(seeks_sky & ~hit.valid, 1, 0)
+        path.seeks_sky = path.hit.valid & sources.passive_on & seeks_sky
+        path.soft = onward.scatters if first else path.soft
+        path.throughput *= onward.kept
+        path.direction = onward.direction
+        if not last:
+            path.arrive(scene, onward)
+            free = dr.select(path.seeks_sky & ~path.hit.valid, 1, 0)
         else:
             # Nothing is seen of a surface beyond the last bounce: whether the sky is, is enough.
             reach = mi.Float(REACH_M)
-            free = scene.transmission(onward.start, direction, reach, instant, seeks_sky)
-        light.ambient += throughput * passive.sky(direction) * free
+            free = scene.transmission(onward.start, path.direction, reach, instant, path.seeks_sky)
+        light.add_ambient(path.throughput * passive.sky(path.direction) * free, path.soft)
     return light
+
+
+def _add_lit_points(
+    light: _Gathered,
+    scene: Scene,
+    sources: _Sources,
+    points: LitPoints,
+    path: _Path,
+    sampler: Sampler,
+) -> None:
+    """Add what the surface reflects of the points that the laser shines on."""
+    hit, instant, laser_on = path.hit, path.instant, path.hit.valid & sources.laser_on
+    chosen = sampler.next_block(POINTS_PER_PATH, POINTS), sampler.next_1d()
+    *_, diffuse = chances(hit)
+    active, correlation = points.light(
+        scene, sources.eye, hit, diffuse, path.walked_m, instant, light.modulation, chosen, laser_on
+    )
+    light.active += dr.select(laser_on, path.throughput * active, 0)
+    light.correlation += dr.select(laser_on, path.throughput * correlation, 0)
+
+
+def _add_passive(
+    light: _Gathered,
+    scene: Scene,
+    sources: _Sources,
+    path: _Path,
+    sampler: Sampler,
+    *,
+    first: bool,
+) -> Onward:
+    """Add what the surface glows and reflects of sun, sky and lamps; returns the way onward."""
+    passive, hit, instant = sources.passive, path.hit, path.instant
+    passive_on = hit.valid & sources.passive_on
+    # Faces of lamps glow for the camera and its mirrors alone: what they shine on others is
+    # the `Lamp`'s, and would be counted twice.
+    glow = dr.select(passive_on & (path.way_back > 0), hit.emission, 0)
+    light.add_ambient(path.throughput * glow)
+
+    # Every lane draws all numbers at each surface, used or not, so that lanes stay in step.
+    aim, which = sampler.next_2d(), sampler.next_1d()
+    number, sample = sampler.next_choice(), sampler.next_2d()
+    onward = Onward.drawn(hit, path.direction, number, sample)
+    if first:
+        to_sky = sampler.next_points(SKY_RAYS)
+        sky = passive.sky_irradiance(scene, hit, instant, to_sky, passive_on)
+        light.add_ambient(sky * hit.diffuse * hit.albedo * dr.inv_pi, soft=True)
+        daylight = passive.sun_irradiance(scene, hit, instant, passive_on)
+    else:
+        daylight = passive.daylight(scene, hit, instant, aim, which, passive_on)
+    irradiance = daylight + passive.lamps(scene, hit, instant, onward.number, passive_on)
+    # The surface reflects to the camera whatever way the path goes on.
+    reflected = path.throughput * irradiance * hit.diffuse * hit.albedo * dr.inv_pi
+    light.add_ambient(reflected, path.soft)
+    return onward
 
 
 def _add_first_return(
@@ -297,33 +327,24 @@ def _true_distance(scene: Scene, eye: Pinhole, instants: int, camera: CameraConf
     return scene.distance_m(origin, direction, lanes.instant)
 
 
-def _collect(light: _Gathered, distance_m: Any, camera: CameraConfig) -> Traced:
+def _collect(light: _Gathered, distance_m: Any, instants: Instants, camera: CameraConfig) -> Traced:
     """Mean over the samples of each pixel."""
     samples = camera.samples_per_pixel
     first = dr.arange(mi.UInt32, len(distance_m)) * samples
+    soft = None if light.soft is None else SoftLight.of(light.soft, light.first)
     # The launch; the sums read other lanes, and so make a second, small kernel.
-    dr.eval(distance_m, light.ambient, light.active, light.correlation)
+    dr.eval(distance_m, light.ambient, light.active, light.correlation, soft)
     images = [
         distance_m,
         *(
-            _sum(values, first, samples) / samples
+            pixel_sums(values, first, samples) / samples
             for values in (light.ambient, light.active, light.correlation)
         ),
     ]
     dr.eval(images)
     shape = (-1, camera.height, camera.width)
-    return Traced(*(image.numpy().reshape(shape) for image in images))
-
-
-def _sum(values, first, count: int):
-    """Sums of `count` neighbours, halves on halves: what `dr.block_sum` gives, but sooner.
-
-    On two cores, three sums of 12 instants of 160 x 120 pixels and 4 samples take 0.2 ms, against
-    14 ms by `dr.block_sum`. Of 4 samples both give the same to the last bit, down to the sign of
-    zero.
-    """
-    parts = [dr.gather(mi.Float, values, first + i) for i in range(count)]
-    while len(parts) > 1:
-        half = (len(parts) + 1) // 2
-        parts = [reduce(add, parts[i::half]) for i in range(half)]
-    return dr.select(parts[0] == 0, 0, parts[0])
+    traced = Traced(*(image.numpy().reshape(shape) for image in images))
+    passive = np.flatnonzero(instants.passive)
+    if soft is not None and len(passive):
+        traced.ambient[passive] += filtered(soft, passive, camera)
+    return traced

@@ -15,7 +15,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from shotenv.render.backend import only_where, upload
+from shotenv.render.backend import upload
 from shotenv.render.instants import Instants
 from shotenv.render.surfaces import REACH_M, Hit, Scene
 from shotenv.world.geometry import MAX_LAMPS, Indoor, Lamp, World, rotation
@@ -78,29 +78,29 @@ class PassiveLight:
         """Radiance of the sky, W m-2 sr-1: linear in the sine of elevation, the horizon's below."""
         return dr.fma(self._zenith - self._horizon, dr.maximum(direction.z, 0), self._horizon)
 
-    def irradiance(self, scene: Scene, hit: Hit, instant, numbers, active):
-        """Estimate of the irradiance of all passive light on a surface, W m-2.
-
-        `numbers` are random: a point of the unit square and a number for `daylight`, a number for
-        `lamps`.
-        """
-        aim, which, lamp = numbers
-        return only_where(
-            active,
-            lambda: (
-                self.daylight(scene, hit, instant, aim, which, active)
-                + self.lamps(scene, hit, instant, lamp, active)
-            ),
-        )
-
     def sky_irradiance(self, scene: Scene, hit: Hit, instant, points, active):
-        """Estimate of the sky's irradiance on a surface, W m-2, by a ray for each of `points`."""
-        frame, total = mi.Frame3f(hit.normal), mi.Float(0)
+        """Estimate of the sky's irradiance on a surface, W m-2, by a ray for each of `points`.
+
+        Points of the unit square. Deep indoors the rays aim at the opening.
+        """
+        frame, total, aimed = mi.Frame3f(hit.normal), mi.Float(0), self.sky_is_aimed_at(hit)
         for point in points:
-            direction = frame.to_world(mi.warp.square_to_cosine_hemisphere(point))
-            free = scene.transmission(hit.leave, direction, mi.Float(REACH_M), instant, active)
-            total += self.sky(direction) * free
+            scattered = frame.to_world(mi.warp.square_to_cosine_hemisphere(point))
+            inward, solid_angle = self._opening.aim(hit.point, point)
+            direction = dr.select(aimed, inward, scattered)
+            # What a ray stands for, by what all directions above the surface do.
+            share = dr.select(aimed, _projected(hit, inward, solid_angle) * dr.inv_pi, 1)
+            seeks = active & (share > 0)
+            free = scene.transmission(hit.leave, direction, mi.Float(REACH_M), instant, seeks)
+            total += self.sky(direction) * share * free
         return total * (dr.pi / len(points))
+
+    def sun_irradiance(self, scene: Scene, hit: Hit, instant, active):
+        """Irradiance of the sun on a surface, with its shadow, W m-2."""
+        sun = self._unshadowed_sun(hit)
+        lit = active & (sun > 0)
+        reach = mi.Float(REACH_M)
+        return sun * scene.transmission(hit.leave, self._sun_direction, reach, instant, lit)
 
     def daylight(self, scene: Scene, hit: Hit, instant, aim, number, active):
         """Irradiance of the sun on a surface, with its shadow, W m-2; deep indoors also the sky's.
@@ -109,16 +109,18 @@ class PassiveLight:
         sky is drawn in proportion to their unshadowed irradiance.
         """
         direction, solid_angle = self._opening.aim(hit.point, aim)
-        cosine = dr.maximum(dr.dot(hit.normal, direction), 0)
-        above = self._opening.is_far(hit.point) & (direction.z > 0)
-        sky = dr.select(above, self.sky(direction) * cosine * solid_angle, 0)
+        sky = self.sky(direction) * _projected(hit, direction, solid_angle)
+        sky = dr.select(self.sky_is_aimed_at(hit), sky, 0)
         choice = _Choice(sky, direction, mi.Float(REACH_M), number)
-        sun = self._sun_irradiance * dr.maximum(dr.dot(hit.normal, self._sun_direction), 0)
-        sun = dr.select(self._opening.lets_in(hit.point, self._sun_direction), sun, 0)
+        sun = self._unshadowed_sun(hit)
         choice = choice.offer(sun, self._sun_direction, mi.Float(REACH_M))
         lit = active & (choice.total > 0)
         share = scene.transmission(hit.leave, choice.direction, choice.length, instant, lit)
         return choice.total * share
+
+    def _unshadowed_sun(self, hit: Hit):
+        sun = self._sun_irradiance * dr.maximum(dr.dot(hit.normal, self._sun_direction), 0)
+        return dr.select(self._opening.lets_in(hit.point, self._sun_direction), sun, 0)
 
     def sky_is_aimed_at(self, hit: Hit):
         """Whether `daylight` holds the sky's light on this surface already."""
@@ -232,6 +234,12 @@ class _Rectangle:
         crossing = point + (self._from.x - point.x) / direction.x * direction
         inside = (crossing.y > self._from.y) & (crossing.y < self._to.y)
         return inside & (crossing.z > self._from.z) & (crossing.z < self._to.z)
+
+
+def _projected(hit: Hit, direction, solid_angle):
+    """Irradiance by radiance of a part of the sky; none is below the horizon."""
+    cosine = dr.maximum(dr.dot(hit.normal, direction), 0)
+    return dr.select(direction.z > 0, cosine * solid_angle, 0)
 
 
 def _opaque_point(numbers):

@@ -20,11 +20,11 @@ POWER_W, INTEGRATION_S, TIME_S, WORLD_SEED = 6.3, 6.4e-4, 0.5, 3
 # Largest error in distance over the sensor's with 4 DCS, and largest median error of the ambient
 # light: of what was measured, with room for another seed of the random numbers.
 LIMITS = {
-    "sunny_road": (0.25, 0.04),
-    "garage": (0.45, 0.02),
-    "warehouse": (1.0, 0.10),
-    "construction_site": (0.45, 0.02),
-    "snowy_street": (0.45, 0.04),
+    "sunny_road": (0.25, 0.025),
+    "garage": (0.45, 0.012),
+    "warehouse": (1.0, 0.02),
+    "construction_site": (0.45, 0.015),
+    "snowy_street": (0.45, 0.008),
 }
 
 

@@ -6,6 +6,7 @@ from .mitsuba_file import (
     parse_mitsuba as parse_mitsuba,
 )
 from .probes import nearest_face as nearest_face
+from .scattering import Onward as Onward, chances as chances
 from .scene import (
     SURFACE_OFFSET_M as SURFACE_OFFSET_M,
     Hit as Hit,

@@ -67,6 +67,7 @@ OTHER_CAMERA = {
     "samples_per_pixel": 2,
     "gray_instants": 2,
     "bounces": 3,
+    "gray_filter_m": 0.1,
     "emission": {"edge_softness_deg": 2.0},
 }
 OTHER_WORLD = {
