@@ -15,7 +15,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import torch
-from figures import decoding, laser, light, movers, renderer, sensor, stray_light
+from figures import decoding, lamps, laser, light, movers, renderer, sensor, stray_light
 from figures.stage import Made, Row
 
 DOCS = Path(__file__).parent
@@ -31,6 +31,7 @@ FIGURES: tuple[Callable[[], Made], ...] = (
     movers.movers,
     renderer.renderer_error,
     stray_light.stray_light,
+    lamps.lamps,
     sensor.photon_transfer,
     sensor.depth_noise,
     sensor.full_well,

@@ -10,21 +10,26 @@ import torch
 
 from shotenv.config import CameraConfig, SensorConfig, WorldConfig
 from shotenv.render.frame import FrameRenderer, RenderedFrame
-from shotenv.sensor import electrons_per_radiance_second
+from shotenv.sensor import capture_gray, electrons_per_radiance_second
 from shotenv.world import draw_world
 from unwrap.signal import decode, distance_m, unambiguous_range_m
 
 pytestmark = pytest.mark.render
 CAMERA = CameraConfig(width=80, height=60)
 POWER_W, INTEGRATION_S, TIME_S, WORLD_SEED = 6.3, 6.4e-4, 0.5, 3
+WELL_EXPOSED = 0.01
+"""Share of the gray image's full scale above which its light is judged."""
+COUNTED = 0.95
+"""Share of the pixels that are judged: an edge behind a pane or in a mirror lies in the others,
+where few rays tell how much of a pixel is on either side of it."""
 # Largest error in distance over the sensor's with 4 DCS, and largest median error of the ambient
-# light: of what was measured, with room for another seed of the random numbers.
+# light: of what was measured in three worlds, with room for another seed of the random numbers.
 LIMITS = {
-    "sunny_road": (0.25, 0.025),
-    "garage": (0.45, 0.012),
-    "warehouse": (1.0, 0.02),
-    "construction_site": (0.45, 0.015),
-    "snowy_street": (0.45, 0.008),
+    "sunny_road": (0.25, 0.02),
+    "garage": (0.25, 0.03),
+    "warehouse": (0.25, 0.02),
+    "construction_site": (0.25, 0.01),
+    "snowy_street": (0.25, 0.015),
 }
 
 
@@ -48,6 +53,12 @@ def sigma_m(frame: RenderedFrame, sensor: SensorConfig):
     return per_radian / (math.sqrt(2) * np.maximum(snr, 1e-9)), snr
 
 
+def gray_words(frame: RenderedFrame, sensor: SensorConfig) -> np.ndarray:
+    """Gray image without the sensor's noise, LSB."""
+    ambient = torch.from_numpy(np.asarray(frame.ambient))
+    return capture_gray(ambient[None], sensor, noise=None)[0][0].double().numpy()
+
+
 def smooth(true_m: np.ndarray) -> np.ndarray:
     """Pixels whose four neighbours are about as far."""
     near = np.where(np.isfinite(true_m) & (true_m < 25.0), true_m, 1e9)
@@ -59,22 +70,25 @@ def smooth(true_m: np.ndarray) -> np.ndarray:
     return even
 
 
+@pytest.mark.parametrize("world_seed", [3, 4, 5])
 @pytest.mark.parametrize("family", LIMITS)
-def test_the_renderers_error_is_small_beside_the_sensors(family, sensor):
-    renderer = FrameRenderer(draw_world(family, WORLD_SEED, WorldConfig()), sensor)
+def test_the_renderers_error_is_small_beside_the_sensors(family, world_seed, sensor):
+    renderer = FrameRenderer(draw_world(family, world_seed, WorldConfig()), sensor)
     one, other = (renderer.frame(TIME_S, CAMERA, seed=seed) for seed in (100, 101))
+    largest, largest_gray = LIMITS[family]
     sigma, snr = sigma_m(one, sensor)
     counted = smooth(one.distance_m) & (snr > 5)
     assert counted.sum() > 100
     apart = apart_m(measured_m(one, sensor), measured_m(other, sensor), sensor)[counted]
-    error_m = np.sqrt((apart**2).mean() / 2)
-    lit = one.ambient > 0.1 * one.ambient.mean()
-    first, second = one.ambient[lit], other.ambient[lit]
-    gray = np.median(np.abs(first - second) / (first + second)) * math.sqrt(2)
-    print(family, error_m / np.sqrt((sigma[counted] ** 2).mean()), gray)
-    largest, largest_gray = LIMITS[family]
-    assert error_m < largest * np.sqrt((sigma[counted] ** 2).mean())
-    assert gray < largest_gray
+    squares = np.sort(apart**2)[: int(COUNTED * len(apart))]
+    error = np.sqrt(squares.mean() / 2) / np.sqrt((sigma[counted] ** 2).mean())
+    first, second = (gray_words(frame, sensor) for frame in (one, other))
+    exposed = first > WELL_EXPOSED * (2**sensor.adc_bits - 1)
+    assert error < largest
+    # By night and where LED lamps shine there may be next to nothing that is well exposed.
+    if exposed.sum() > 100:
+        apart_gray = np.abs(first - second)[exposed] / (first + second)[exposed]
+        assert np.median(apart_gray) * math.sqrt(2) < largest_gray
 
 
 @pytest.mark.slow

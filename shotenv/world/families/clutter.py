@@ -50,7 +50,8 @@ MOST_OVERHEAD = 8
 MOVER_TRIES = 12
 """Ways that are tried for something that moves, before it is left out."""
 LAMP_IRRADIANCE: Range = (1e-2, 0.5)
-"""Irradiance in band that one lamp gives what it is for, W m-2; an assumed range."""
+"""Irradiance in band that one lamp gives what it is for, W m-2; an assumed range, of lamps of no
+kind: what networks learn here is to hold for any light."""
 LIT_SHARE = 0.4
 """What a lamp is for is this share of the place's height and reach away; assumed."""
 LAMP_SIDE_M = 0.2
@@ -189,7 +190,8 @@ def put_lamp(site: Site, rng: np.random.Generator, reach_m: float, ceiling_m: fl
     height = float(rng.uniform(0.3, ceiling_m - 0.2, 2).max())
     aim = rng.normal(0.0, 1.0, 3) - (0.0, 0.0, 1.5)
     aim /= np.linalg.norm(aim)
-    intensity = lights.intensity_for(rng, LAMP_IRRADIANCE, LIT_SHARE * (ceiling_m + reach_m))
+    away_m = LIT_SHARE * (ceiling_m + reach_m)
+    intensity = m.log_uniform(rng, LAMP_IRRADIANCE) * away_m**2
     cutoff = rng.uniform(-0.3, 0.9)
     radiance = lights.face_radiance(intensity, LAMP_SIDE_M**2)
     face = lamp_face(aim, any_surface(rng).glowing(radiance))

@@ -21,9 +21,8 @@ from shotenv.world.geometry import (
 )
 from shotenv.world.things import axle, people
 
-FLOOD_IRRADIANCE = (5e-3, 5e-2)
-"""Irradiance in band of a flood light, at a distance of twice its height, W m-2; an assumed
-range."""
+FLOOD_LIGHTING = lights.Lighting((20.0, 100.0), {"led": 0.5, "halogen": 0.3, "metal_halide": 0.2})
+"""Illuminance of a flood light, at a distance of twice its height, lx; all assumed."""
 
 
 def lay_out_construction_site(site: Site, rng: np.random.Generator) -> None:
@@ -95,7 +94,7 @@ def put_flood_light(site: Site, rng: np.random.Generator, half: float) -> None:
     """A mast with lamps that look down the road; lit at night."""
     height = rng.uniform(3.5, 5.5)
     # It shines obliquely along the road, so that what it lights is further off than its height.
-    intensity = lights.intensity_for(rng, FLOOD_IRRADIANCE, 2 * height) if site.night else 0.0
+    intensity = lights.intensity_above(rng, FLOOD_LIGHTING, 2 * height) if site.night else 0.0
     x, side = site.travel_m + rng.uniform(4.0, 12.0), rng.choice([-1, 1])
     mesh = light_tower(rng, height, lights.face_radiance(intensity, 0.24))
     if site.put(mesh, x, side * (half + 0.7), np.pi) and intensity:

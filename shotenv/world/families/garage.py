@@ -30,8 +30,8 @@ from unwrap.support import Range
 
 TUBE_LAMP_M = 1.4
 TUBE_WIDTH_M = 0.12
-TUBE_IRRADIANCE: Range = (5e-3, 0.1)
-"""Irradiance in band straight below one ceiling lamp, W m-2; an assumed range."""
+GARAGE_LIGHTING = lights.Lighting((50.0, 150.0), {"led": 0.5, "fluorescent": 0.5})
+"""Illuminance straight below one ceiling lamp, lx (EN 12464-1: 75 on average); shares assumed."""
 SLAB_M = 0.3
 """Thickness of a garage's roof."""
 BEAM_M = 0.22
@@ -326,9 +326,10 @@ def build_ceiling_lamps(
     x: tuple[float, float],
     height: float,
     rows: tuple[float, ...],
+    lighting: lights.Lighting = GARAGE_LIGHTING,
 ) -> None:
     """Tubes under a ceiling along x, all of one kind, a few of them dead."""
-    intensity = lights.intensity_for(rng, TUBE_IRRADIANCE, height)
+    intensity = lights.intensity_above(rng, lighting, height)
     radiance = lights.face_radiance(intensity, TUBE_LAMP_M * TUBE_WIDTH_M)
     casing, pitch = m.WHITE_PAINT.draw(rng), rng.uniform(3.5, 6.0)
     low = height - 0.14

@@ -15,15 +15,15 @@ from shotenv.world.families.traffic import (
     put_walkers,
     roadside_thing,
 )
-from shotenv.world.geometry import Mesh, Site, materials as m, meshes
+from shotenv.world.geometry import Mesh, Site, lights, materials as m, meshes
 from shotenv.world.things import buildings, furniture, plants, shelters, vehicles
 from unwrap.support import Range
 
 BEHIND_M = 60.0
 REACH_M = 120.0
 """How far ground and roads reach behind the ego, and beyond the end of its way and to the sides."""
-SHOP_RADIANCE = (2e-3, 5e-2)
-"""Radiance of the ceiling of a shop that is lit by night, W m-2 sr-1; an assumed range."""
+SHOP_LIGHTING = lights.Lighting((50.0, 300.0), {"led": 0.6, "fluorescent": 0.2, "halogen": 0.2})
+"""Luminance of the ceiling of a shop that is lit by night, cd m-2; all assumed."""
 KERB_M = 0.12
 """Height of a pavement over the road."""
 UNDER_ROAD_M = -0.01
@@ -222,7 +222,7 @@ def put_facades(site: Site, rng: np.random.Generator, y: float, yaw: float) -> N
         length, kind = rng.uniform(6.0, 12.0), rng.random()
         centre = x + length / 2
         if kind < 0.25:
-            glow = m.log_uniform(rng, SHOP_RADIANCE) if site.night and rng.random() < 0.6 else 0.0
+            glow = SHOP_LIGHTING.draw_in_band(rng) if site.night and rng.random() < 0.6 else 0.0
             site.put(shelters.shop_front(rng, length, glow), centre, y, yaw, KERB_M)
         elif kind < 0.65:
             site.put(buildings.facade(rng, length, site.night), centre, y, yaw, KERB_M)

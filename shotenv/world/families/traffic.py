@@ -30,12 +30,17 @@ from unwrap.support import Range
 
 HEADLAMP_M2 = 0.05
 """Area of the face of a head light."""
-HEADLAMP_W_SR = (0.05, 1.0)
-"""Intensity of a head light in band: LED ones hardly shine there, halogen ones do; assumed."""
-TAIL_RADIANCE = (0.02, 0.2)
-"""Radiance of a tail lamp's face in band, W m-2 sr-1; an assumed range."""
-STREET_IRRADIANCE = (1e-3, 2e-2)
-"""Irradiance in band below a street lamp, W m-2; an assumed range."""
+HEADLAMP_CUTOFF_COS = float(np.cos(0.5))
+TAIL_LAMPS = lights.Lighting((4.0, 12.0), {"led": 0.6, "incandescent": 0.4})
+"""Intensity to the rear, cd (UNECE R7: 4 to 12 for one lamp); shares assumed."""
+TAIL_LAMP_M2 = 0.04
+"""Area of the face of a tail lamp."""
+RED_SHARE = 0.2
+"""Share of a bulb's lumens that a red cover lets through; it lets all of the near infrared
+through. Assumed."""
+STREET_LIGHTING = lights.Lighting((5.0, 30.0), {"led": 0.6, "sodium": 0.3, "metal_halide": 0.1})
+"""Illuminance straight below a street lamp, lx, between those of EN 13201 for quiet and busy
+streets; range and shares assumed."""
 TRIES = 4
 """Places that are tried for something that moves, before it is left out."""
 DrawPasser = Callable[[np.random.Generator, float], tuple[Mover, float]]
@@ -140,7 +145,7 @@ def put_vehicle_ahead(site: Site, rng: np.random.Generator) -> None:
     leaves_s = rng.uniform(-2.0, 1.2 * site.duration_s)
     sets_off = site.travel_m == 0.0 and rng.random() < 0.5
     for place in range(1 + (rng.random() < 0.3)):
-        tail = m.log_uniform(rng, TAIL_RADIANCE) if site.night else 0.0
+        tail = tail_radiance(rng) if site.night else 0.0
         narrow = place == 0 and rng.random() < 0.12
         vehicle = cycles.cyclist(rng) if narrow else vehicles.traffic(rng, 0.0, tail)
         back, nose, _ = extent(vehicle)
@@ -153,6 +158,15 @@ def put_vehicle_ahead(site: Site, rng: np.random.Generator) -> None:
         if not site.put_moving(vehicle, route):
             return
         rear += nose - back + rng.uniform(1.5, 4.0) + ego_speed * (reaction_s + 0.3)
+
+
+def tail_radiance(rng: np.random.Generator) -> float:
+    """Radiance of the face of a tail lamp in band, W m-2 sr-1."""
+    kind = TAIL_LAMPS.draw_kind(rng)
+    intensity = lights.IN_BAND_W_PER_LM[kind] * m.log_uniform(rng, TAIL_LAMPS.amount)
+    # LEDs are red of themselves; bulbs are white behind a red cover.
+    bulb = intensity / RED_SHARE if kind == "incandescent" else intensity
+    return lights.face_radiance(bulb, TAIL_LAMP_M2)
 
 
 def extent(mover: Mover) -> tuple[float, float, float]:
@@ -186,7 +200,7 @@ def put_approaching(
     """A vehicle seen from the front that brakes for what is ahead; lit in the dark."""
     # In garages and tunnels too, whatever the time of day.
     lit = site.night or site.indoor is not None
-    intensity = m.log_uniform(rng, HEADLAMP_W_SR) if lit else 0.0
+    intensity = lights.low_beam_intensity(rng, HEADLAMP_CUTOFF_COS) if lit else 0.0
     vehicle = draw(rng, lights.face_radiance(intensity, HEADLAMP_M2))
     # Lamps are fixed to its first piece.
     carrier = len(site.moving)
@@ -212,9 +226,10 @@ def head_lights(mesh: Mesh, intensity_w_sr: float, carrier: int) -> list[Lamp]:
     # A little before the body, which would otherwise stand in their light.
     nose, half = float(mesh.corners[..., 0].max()) + 0.15, float(mesh.corners[..., 1].max())
     sides = (0.0,) if half < 0.6 else (0.3 - half, half - 0.3)
-    ahead, cutoff = lights.direction(0.0, -0.03), float(np.cos(0.5))
+    ahead = lights.direction(0.0, -0.03)
     return [
-        Lamp((nose, y, 0.75), intensity_w_sr, 0.1, ahead, cutoff, carrier=carrier) for y in sides
+        Lamp((nose, y, 0.75), intensity_w_sr, 0.1, ahead, HEADLAMP_CUTOFF_COS, carrier=carrier)
+        for y in sides
     ]
 
 
@@ -248,7 +263,7 @@ def put_street_lamps(
 ) -> None:
     """Lamp posts on the right whose arms reach over the road; by night they shine."""
     height = rng.uniform(4.5, 7.5)
-    intensity = lights.intensity_for(rng, STREET_IRRADIANCE, height) if site.night else 0.0
+    intensity = lights.intensity_above(rng, STREET_LIGHTING, height) if site.night else 0.0
     area = furniture.LAMP_HEAD_M[0] * furniture.LAMP_HEAD_M[1]
     radiance = lights.face_radiance(intensity, area)
     for x in np.arange(rng.uniform(-8.0, 8.0), site.travel_m + 50.0, every_m):

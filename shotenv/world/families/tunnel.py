@@ -15,11 +15,15 @@ from shotenv.world.geometry import (
     Pose,
     Site,
     ground_speed_m_s,
+    lights,
     materials as m,
     meshes,
 )
 from shotenv.world.things import buildings, furniture, plants
 from unwrap.support import Range
+
+TUNNEL_LIGHTING = lights.Lighting((50.0, 300.0), {"led": 0.5, "sodium": 0.4, "fluorescent": 0.1})
+"""Illuminance straight below one lamp, lx; all assumed."""
 
 
 def lay_out_tunnel(site: Site, rng: np.random.Generator) -> None:
@@ -44,7 +48,8 @@ def lay_out_tunnel(site: Site, rng: np.random.Generator) -> None:
         mouth,
         mouth if tube[0] > -BEHIND_M else None,
     )
-    build_ceiling_lamps(site, rng, (max(tube[0], -12.0), tube[1]), height - 0.05, (centre,))
+    lit = max(tube[0], -12.0), tube[1]
+    build_ceiling_lamps(site, rng, lit, height - 0.05, (centre,), TUNNEL_LIGHTING)
     put_wall_things(site, rng, centre - half, tube)
     edges = centre - half - 0.3, centre + half + 0.3
     site.build_ground(m.GRASS.draw(rng), UNDER_ROAD_M)

@@ -28,15 +28,16 @@ from shotenv.world.geometry import (
     meshes,
 )
 from shotenv.world.things import axle, people
-from unwrap.support import Range
 
 RACK_DEPTH_M = 1.1
 BAY_M = 2.7
 """Width of a rack's bay: room for two pallets side by side."""
 LAMP_M = (0.6, 0.4)
 """Length and width of the glowing face of a high-bay lamp."""
-HIGH_BAY_IRRADIANCE: Range = (1e-2, 0.3)
-"""Irradiance in band straight below one lamp, W m-2; an assumed range."""
+HIGH_BAY_LIGHTING = lights.Lighting(
+    (150.0, 300.0), {"led": 0.6, "fluorescent": 0.2, "metal_halide": 0.2}
+)
+"""Illuminance straight below one lamp, lx (EN 12464-1: 100 to 300 in stores); shares assumed."""
 
 
 def lay_out_warehouse(site: Site, rng: np.random.Generator) -> None:
@@ -166,7 +167,7 @@ def put_fork_lift(site: Site, rng: np.random.Generator, end: float, aisle: float
 def build_high_bays(site: Site, rng: np.random.Generator, end: float, height: float) -> None:
     """Lamps under the roof along the aisle."""
     drop = height - 0.6
-    intensity = lights.intensity_for(rng, HIGH_BAY_IRRADIANCE, drop)
+    intensity = lights.intensity_above(rng, HIGH_BAY_LIGHTING, drop)
     radiance, metal = lights.face_radiance(intensity, LAMP_M[0] * LAMP_M[1]), m.METAL.draw(rng)
     for x in np.arange(-5.0, end - 1.0, rng.uniform(4.0, 6.5)):
         site.build(high_bay(metal, radiance, float(x), drop))

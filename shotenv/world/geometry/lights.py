@@ -2,12 +2,16 @@
 
 Numbers are for 940 +- 15 nm: irradiance W m-2, radiance W m-2 sr-1, radiant intensity W sr-1.
 Direct sun is ASTM G173's 11.6 W m-2 (air mass 1.5), scaled with air mass by Meinel's clearness
-law; sky radiances and lamp intensities are assumed ranges.
+law; sky radiances are assumed ranges. Lamps are told as their makers tell them, in lm, cd, lx and
+cd m-2, and `IN_BAND_W_PER_LM` has what their kind gives in band for it: a street that LED lamps
+light well is dark to the sensor.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -22,11 +26,60 @@ LOW_SUN_RAD = np.radians(15.0)
 """Elevation below which the sun counts as low."""
 DUSK_RADIANCE = 5e-3
 """Radiance of the sky below which lamps are lit, W m-2 sr-1."""
-TWILIGHT: Range = (20.0, 200.0)
-"""How much brighter than the night's the sky of a dusk is at first; assumed."""
+NIGHT_SKY: Range = (5e-7, 1e-5)
+"""Radiance of the sky by night, W m-2 sr-1, over decades. Assumed: airglow is of the order of the
+lower end, a full moon's sky is the day's by its 400,000, and towns add to both."""
+TWILIGHT: Range = (2e-3, 3e-2)
+"""Radiance of the sky when a dusk begins, W m-2 sr-1; assumed."""
 FASTEST_FADING_PER_S = 0.6
 BRIGHTEST_FACE = 2.0
 """Radiance at which lamp faces are capped, W m-2 sr-1: about a white wall in the sun."""
+
+LampKind = Literal["led", "halogen", "incandescent", "fluorescent", "sodium", "metal_halide"]
+
+IN_BAND_W_PER_LM: dict[LampKind, float] = {
+    # Planck at 3000 K and at 2700 K over CIE's photopic luminosity. Tungsten emits about 14 % less
+    # at 940 nm than in the green, for the same temperature; that is ignored.
+    "halogen": 9.8e-4,
+    "incandescent": 1.42e-3,
+    # All assumed. The spectrum of LEDs ends before 800 nm but for a faint tail; discharges in
+    # mercury, in sodium (high pressure) and in metal halides have lines in the near infrared.
+    "led": 1e-6,
+    "fluorescent": 5e-6,
+    "sodium": 2e-5,
+    "metal_halide": 1e-4,
+}
+"""Power within 940 +- 15 nm for each lumen, W lm-1. The sun's is about 1e-4."""
+
+
+@dataclass(frozen=True)
+class Lighting:
+    """How bright lamps of a place or a vehicle are to the eye, and which kinds of lamps they are.
+
+    Attributes
+    ----------
+    amount : (low, high)
+        Flux (lm), intensity (cd), illuminance (lx) or luminance (cd m-2), drawn log-uniformly.
+    shares : mapping
+        How often a lamp is of a kind; they add up to 1.
+    """
+
+    amount: Range
+    shares: Mapping[LampKind, float]
+
+    def draw_kind(self, rng: np.random.Generator) -> LampKind:
+        """Kind of a lamp."""
+        kinds = tuple(self.shares)
+        return kinds[rng.choice(len(kinds), p=tuple(self.shares.values()))]
+
+    def draw_in_band(self, rng: np.random.Generator) -> float:
+        """A lamp's kind and amount are drawn: W for lm, W sr-1 for cd, W m-2 for lx, and so on."""
+        return IN_BAND_W_PER_LM[self.draw_kind(rng)] * log_uniform(rng, self.amount)
+
+
+LOW_BEAM = Lighting((400.0, 1000.0), {"led": 0.5, "halogen": 0.5})
+"""Flux that leaves one head lamp, lm, about half of its source's (UNECE R37: 1000 lm for H4's low
+beam, 1500 for H7); range and shares assumed."""
 
 
 def sun_irradiance(elevation_rad: float) -> float:
@@ -90,8 +143,7 @@ def overcast(rng: np.random.Generator) -> Light:
 
 def night(rng: np.random.Generator) -> Light:
     """A dark sky, a little brighter at the horizon, and often the ego's own head lights."""
-    # Over decades, since so do moonlight and a town's glow.
-    sky = log_uniform(rng, (3e-5, 3e-4))
+    sky = log_uniform(rng, NIGHT_SKY)
     lamps = ego_headlights(rng) if rng.random() < 0.75 else ()
     return Light(0.0, (0.0, 0.0, 1.0), sky, 1.5 * sky, lamps)
 
@@ -102,7 +154,7 @@ def dusk(rng: np.random.Generator, night: Light, duration_s: float) -> Light:
     Nature takes half an hour for it. Clips show in seconds what drives go through, but no faster
     than `FASTEST_FADING_PER_S`, so that neighbouring frames still differ little.
     """
-    brighter = log_uniform(rng, TWILIGHT)
+    brighter = log_uniform(rng, TWILIGHT) / night.sky_zenith
     fading = min(np.log(brighter) / duration_s, FASTEST_FADING_PER_S)
     # In a short clip it does not get as dark as the night in which it ends otherwise.
     return replace(
@@ -134,13 +186,24 @@ def is_dark(light: Light) -> bool:
 
 
 def ego_headlights(rng: np.random.Generator) -> tuple[Lamp, ...]:
-    """Two head lights beside the camera: LED ones hardly shine in band, halogen ones do."""
-    # One draw for both, which are alike; aimed 3 degrees down, with nothing beyond 26 degrees.
-    intensity = log_uniform(rng, (0.05, 3.0))
+    """Two head lights beside the camera, alike."""
+    # Aimed 3 degrees down, with nothing beyond 26 degrees.
+    cutoff = float(np.cos(0.45))
+    intensity = low_beam_intensity(rng, cutoff)
     return tuple(
-        Lamp((0.2, y, 0.65), intensity, 0.1, direction(0.0, -0.05), float(np.cos(0.45)), rides=True)
+        Lamp((0.2, y, 0.65), intensity, 0.1, direction(0.0, -0.05), cutoff, rides=True)
         for y in (-0.65, 0.65)
     )
+
+
+def low_beam_intensity(rng: np.random.Generator, cutoff_cos: float) -> float:
+    """Intensity on the axis of a head lamp, W sr-1, whose cone ends at a cosine from it.
+
+    All of its flux is in the cone: with the 10 to 40 kcd that real head lamps have in a few
+    degrees, so wide a cone would give several times the flux of its bulb.
+    """
+    # The smooth step of a `Lamp` has half of the cone's solid angle as its integral.
+    return LOW_BEAM.draw_in_band(rng) / (np.pi * (1.0 - cutoff_cos))
 
 
 def face_radiance(intensity_w_sr: float, area_m2: float) -> float:
@@ -148,6 +211,6 @@ def face_radiance(intensity_w_sr: float, area_m2: float) -> float:
     return min(intensity_w_sr / area_m2, BRIGHTEST_FACE)
 
 
-def intensity_for(rng: np.random.Generator, irradiance: Range, height_m: float) -> float:
-    """Intensity, W sr-1, that gives an irradiance drawn from a range straight below a lamp."""
-    return log_uniform(rng, irradiance) * height_m**2
+def intensity_above(rng: np.random.Generator, lighting: Lighting, height_m: float) -> float:
+    """Intensity, W sr-1, of a lamp whose illuminance (lx) straight below is drawn."""
+    return lighting.draw_in_band(rng) * height_m**2

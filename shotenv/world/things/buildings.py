@@ -6,7 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from shotenv.world.geometry import Material, Mesh, materials as m, meshes
+from shotenv.world.geometry import Material, Mesh, lights, materials as m, meshes
+
+ROOM_LIGHTING = lights.Lighting(
+    (5.0, 50.0), {"led": 0.7, "fluorescent": 0.1, "halogen": 0.1, "incandescent": 0.1}
+)
+"""Luminance of a lit window, cd m-2; all assumed."""
 
 
 def wall_material(rng: np.random.Generator) -> Material:
@@ -51,8 +56,7 @@ def window(rng: np.random.Generator, y: float, sill_m: float, lit: bool) -> Mesh
     """A framed pane, a sill; at night one window in three is lit."""
     frame, glass = m.WHITE_PAINT.draw(rng), m.GLASS.draw(rng)
     if lit and rng.random() < 0.3:
-        # W m-2 sr-1; assumed. LED light has little in band, halogen and candles have more.
-        glass = glass.glowing(m.log_uniform(rng, (5e-4, 5e-3)))
+        glass = glass.glowing(ROOM_LIGHTING.draw_in_band(rng))
     half, top = 0.52, sill_m + 1.35
     panes = [(y - half + 0.07, y - 0.03), (y + 0.03, y + half - 0.07)]
     return meshes.join(

@@ -48,7 +48,8 @@ def test_reflectance_does_not_depend_on_distance(seen):
     seen = [(np.log(distance), albedo) for distance, albedo in seen if len(distance) > 3]
     log_distance, albedo = (np.concatenate(part) for part in zip(*seen, strict=True))
     assert abs(np.corrcoef(log_distance, albedo)[0, 1]) < 0.12
-    within = [np.corrcoef(*one)[0, 1] for one in seen if all(part.std() > 0 for part in one)]
+    # Where all that is seen has one albedo, its deviation is that of float32's rounding.
+    within = [np.corrcoef(*one)[0, 1] for one in seen if all(part.std() > 1e-6 for part in one)]
     assert abs(np.mean(within)) < 0.15
 
 
