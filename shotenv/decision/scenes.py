@@ -16,7 +16,7 @@ from unwrap.signal import unambiguous_range_m
 GRID = 8
 """Cells down and across an image in which ambient light is compared from frame to frame."""
 DARKEST_RADIANCE = 1e-5
-"""Floor of the ambient radiance, W m-2 sr-1: a tenth of a moonless night's."""
+"""Floor of the ambient radiance, W m-2 sr-1: less does not show in a gray image."""
 
 
 @dataclass(frozen=True)
