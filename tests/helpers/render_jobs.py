@@ -8,11 +8,19 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np  # noqa: F401 - loads the libraries that `blas_threads` counts.
+from threadpoolctl import threadpool_info
+
 from shotenv.render.backend.workers import run_jobs
 
 
 def squared(number: int) -> tuple[int, int]:
     return number * number, os.getpid()
+
+
+def blas_threads(_: int) -> set[int]:
+    """Threads of each library of linear algebra that NumPy loads."""
+    return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
 
 
 def fail_at_three(number: int) -> int:

@@ -233,9 +233,12 @@ def _limit_threads(threads: int) -> None:
         sys.modules["torch"].set_num_threads(threads)
     try:
         import drjit
+        from threadpoolctl import threadpool_limits
     except ImportError:
         return  # The first job that renders says so in a better way.
     drjit.set_thread_count(threads)
+    # NumPy's own threads wait for work by spinning: a fifth of a core for the lens of small images.
+    threadpool_limits(threads)
 
 
 def _is_stopped(pid: int | None) -> bool:

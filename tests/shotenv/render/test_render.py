@@ -267,6 +267,11 @@ def test_workers_share_the_cores_with_torch_too():
     assert dict(run_jobs(torch_jobs.threads, [0], workers=2)) == {0: share}
 
 
+def test_workers_share_the_cores_with_numpy_too():
+    share = max(1, workers.available_cores() // 2)
+    assert dict(run_jobs(render_jobs.blas_threads, [0], workers=2)) == {0: {share}}
+
+
 def test_leaving_the_loop_ends_the_workers():
     for _ in run_jobs(render_jobs.squared, iter(int, 1), workers=2):
         break
