@@ -15,7 +15,17 @@ from pathlib import Path
 
 import matplotlib as mpl
 import torch
-from figures import decoding, lamps, laser, light, movers, renderer, sensor, stray_light
+from figures import (
+    decoding,
+    lamps,
+    laser,
+    light,
+    movers,
+    path_depth,
+    renderer,
+    sensor,
+    stray_light,
+)
 from figures.stage import Made, Row
 
 DOCS = Path(__file__).parent
@@ -30,6 +40,7 @@ FIGURES: tuple[Callable[[], Made], ...] = (
     light.motion,
     movers.movers,
     renderer.renderer_error,
+    path_depth.path_depth,
     stray_light.stray_light,
     lamps.lamps,
     sensor.photon_transfer,
