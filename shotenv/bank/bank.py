@@ -48,7 +48,8 @@ class BankFrame:
     clip : Clip
         Where the frame belongs.
     time_s, ego_speed_m_s, yaw_rate_rad_s, gray_exposure_s : float
-        Time in the clip, ego motion, exposure time of the gray image.
+        Time in the clip; speed along the camera's heading and its yaw rate; exposure time of the
+        gray image.
     """
 
     exposure: Exposure

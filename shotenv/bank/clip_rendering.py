@@ -35,7 +35,7 @@ def render_clip(job: ClipJob) -> str:
     config = job.config
     world = world_of(job)
     times = np.arange(job.frames) / config.world.frame_rate_hz
-    rendered = _render_frames(world, times, config, job.seed)
+    rendered = _render_frames(world, times, job)
     light = {
         name: np.stack([getattr(frame, name) for frame in rendered])
         for name in ARRAYS
@@ -43,7 +43,7 @@ def render_clip(job: ClipJob) -> str:
     }
     # The noise of the gray image belongs to the bank: what networks make of it is then the same in
     # every drive, and can be kept.
-    generator = torch.Generator().manual_seed(_seed(job.seed, GRAY_NOISE))
+    generator = torch.Generator().manual_seed(_seed(job, GRAY_NOISE))
     noise = torch.randn(light["ambient"].shape, generator=generator)
     gray, exposure_s = capture_gray(torch.from_numpy(light["ambient"]), config.sensor, noise=noise)
     metadata = {
@@ -112,29 +112,30 @@ def mean_speed_m_s(world: World, config: BankConfig) -> float:
     return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum() / times[-1])
 
 
-def _render_frames(
-    world: World, times: np.ndarray, config: BankConfig, seed: int
-) -> list[RenderedFrame]:
+def _render_frames(world: World, times: np.ndarray, job: ClipJob) -> list[RenderedFrame]:
     """Frames of a clip; motion blurs gray for as long as the frame before called for.
 
     Before the first frame comes a coarse look, as a light meter takes it.
     """
-    camera, sensor = config.camera, config.sensor
+    camera, sensor = job.config.camera, job.config.sensor
     coarse = {"width": camera.width // METER_REDUCTION, "height": camera.height // METER_REDUCTION}
     meter = camera.model_copy(update=coarse)
     renderer = FrameRenderer(world, sensor)
     # The meter's look has a seed of its own, as if it were one frame more.
-    frames = [renderer.frame(float(times[0]), meter, seed=_seed(seed, len(times)))]
+    frames = [renderer.frame(float(times[0]), meter, seed=_seed(job, len(times)))]
     for number, time in enumerate(times):
         light = torch.from_numpy(frames[-1].ambient).unsqueeze(0)
         exposure_s = float(gray_exposure_s(light, sensor))
-        frame_seed = _seed(seed, number)
+        frame_seed = _seed(job, number)
         frames.append(
             renderer.frame(float(time), camera, seed=frame_seed, gray_exposure_s=exposure_s)
         )
     return frames[1:]
 
 
-def _seed(clip_seed: int, number: int) -> int:
-    """A 32-bit seed of its own for each frame of each clip."""
-    return int(np.random.SeedSequence([clip_seed, number + 1]).generate_state(1)[0])
+def _seed(job: ClipJob, number: int) -> int:
+    """A 32-bit seed of its own for each frame of each clip, also of clips that share a world."""
+    camera = job.config.world.mounts.index(job.mount)
+    # Without the number of the first camera: the seeds of cars with one are without any.
+    numbers = [job.seed, number + 1, camera] if camera else [job.seed, number + 1]
+    return int(np.random.SeedSequence(numbers).generate_state(1)[0])

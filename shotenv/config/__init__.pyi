@@ -1,5 +1,6 @@
 from .bank import (
     HIGHEST_SPEED_M_S as HIGHEST_SPEED_M_S,
+    MOST_FRAMES as MOST_FRAMES,
     BankConfig as BankConfig,
     CameraConfig as CameraConfig,
     WorldConfig as WorldConfig,

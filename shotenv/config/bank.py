@@ -22,6 +22,9 @@ from unwrap.support import NonNegative, Positive, Range, Section, check_range
 HIGHEST_SPEED_M_S = 60.0
 """Of the ego: faster than any car that a sensor of 25 m would be put on."""
 
+MOST_FRAMES = 4096
+"""Of one clip."""
+
 
 class CameraConfig(Section):
     """Image geometry, the laser beside the lens, and the instants that are rendered."""
@@ -59,7 +62,7 @@ class WorldConfig(Section):
         (0.0, 15.0), description="ego speed, m/s; it stands and reverses only if the first is 0"
     )
     frame_rate_hz: Positive = Field(10.0, description="frames per second of a clip")
-    frames_per_clip: int = Field(16, ge=1, le=4096, description="frames of one clip")
+    frames_per_clip: int = Field(16, ge=1, le=MOST_FRAMES, description="frames of one clip")
     mounts: tuple[MountConfig, ...] = Field(
         (MountConfig(),), min_length=1, description="sensor modules of the car, a clip for each"
     )

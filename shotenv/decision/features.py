@@ -182,8 +182,8 @@ SCENE_FEATURES = (
     Feature("network_distance", "scored range", "mean predicted distance", lambda s: frame_means(s.predicted_m) / s.range_m),
     Feature("network_confidence", "1", "mean confidence of the network", lambda s: frame_means(s.confidence)),
     Feature("network_beyond", "1", "share of pixels that the network sees beyond the unambiguous range", lambda s: frame_shares(s.predicted_m > s.unambiguous_m)),
-    Feature("ego_speed", "15 m/s", "speed of the vehicle, negative backwards", lambda s: s.ego_speed_m_s / 15.0),
-    Feature("yaw_rate", "0.5 rad/s", "yaw rate of the vehicle", lambda s: s.yaw_rate_rad_s / 0.5),
+    Feature("ego_speed", "15 m/s", "speed along the camera's heading, negative backwards", lambda s: s.ego_speed_m_s / 15.0),
+    Feature("yaw_rate", "0.5 rad/s", "yaw rate of the camera", lambda s: s.yaw_rate_rad_s / 0.5),
 )
 """Functions of a `Scene`."""
 

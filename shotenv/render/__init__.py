@@ -4,7 +4,8 @@ From the sensor inwards: `frame.py` gives what the sensor needs of one frame, `i
 when light is gathered for it, `lens.py` strays some of it. `integrator.py` walks the light paths,
 and adds at each surface the light of `light.py` (sun, sky, lamps) and of the laser: `beam.py` has
 its profile, `pinhole.py` puts it beside the camera, `laser_light.py` finds its ways,
-`modulation.py` modulates it. `sampling.py` draws random numbers, `surfaces` has what rays meet.
+`modulation.py` modulates it. `irradiance_filter.py` averages gray light over neighbours.
+`sampling.py` draws random numbers, `surfaces` has what rays meet.
 `stock.py` gives the same world to Mitsuba's own integrators, for tests and benchmarks.
 
 Another passive light goes into `light.py`; another property of surfaces into `Mesh` of

@@ -1,8 +1,9 @@
 """Sun, sky and lamps.
 
-Sun and lamps are sought by a shadow ray each, the sky by the rays that the light paths shoot
-anyway: what shades one of them (a roof hides the sky) then adds no noise to the others. Deep
-indoors those rays would hardly ever find the sky, so the sun's ray aims at the opening.
+Sun and lamps are sought by a shadow ray each, the sky by further rays from the first surface, and
+by those that the light paths shoot anyway from the others: what shades one of them (a roof hides
+the sky) then adds no noise to the others. Deep indoors such rays would hardly ever find the sky:
+from the first surface they aim at the opening, from others the sun's ray does.
 """
 
 from __future__ import annotations

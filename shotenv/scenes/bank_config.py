@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 from shotenv.config import (
+    MOST_FRAMES,
     BankConfig,
     MaterialsConfig,
     OwnSceneConfig,
@@ -18,7 +19,6 @@ from shotenv.scenes.way_checks import check_way
 NOT_READ = "0" * 64
 """Stands for the digest while the scene that has it is read."""
 LONGEST_NAME = 60
-MOST_FRAMES = 4096
 
 
 def own_bank(base: BankConfig, scene: Path, way: Path, materials: Path | None = None) -> BankConfig:

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from shotenv.config import HIGHEST_SPEED_M_S
 from shotenv.render.surfaces import nearest_face
 from shotenv.world.geometry import Motion
 
-FASTEST_M_S = 60.0
 STEP_S = 0.02
 """Time between the places that are looked at: at most 1.2 m apart."""
 LOOKS = 64
@@ -33,7 +33,8 @@ def check_way(camera: Motion, duration_s: float, corners: np.ndarray, title: str
     Raises
     ------
     ValueError
-        It is faster than `FASTEST_M_S`, goes through a triangle, or runs inside a closed body.
+        It is faster than `HIGHEST_SPEED_M_S`, goes through a triangle, or runs inside a closed
+        body.
     """
     times = np.linspace(0.0, duration_s, max(2, math.ceil(duration_s / STEP_S) + 1))
     places = np.array([camera.at(time).position_m for time in times])
@@ -57,10 +58,10 @@ def check_way(camera: Motion, duration_s: float, corners: np.ndarray, title: str
 
 def _check_speed(times: np.ndarray, length_m: np.ndarray, title: str) -> None:
     speed = length_m / np.diff(times)
-    if speed.max() > FASTEST_M_S:
+    if speed.max() > HIGHEST_SPEED_M_S:
         raise ValueError(
             f"{title} moves at {speed.max():.1f} m/s {times[speed.argmax()]:.2f} s after its "
-            f"start; expected at most {FASTEST_M_S:g} m/s"
+            f"start; expected at most {HIGHEST_SPEED_M_S:g} m/s"
         )
 
 

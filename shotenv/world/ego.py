@@ -81,7 +81,7 @@ def draw_ego(
     else:
         profile = draw_profile(rng, place.speed_m_s, limits, duration_s)
         road = draw_bends(rng, place.bend_m, profile, duration_s)
-    # Drivers swing about the middle of their lane once in 5 to 9 s.
+    # Drivers swing about the middle of their lane once in 5 to 9 s and 15 m.
     length = 15.0 + profile.highest_m_s * rng.uniform(5.0, 9.0)
     weave = WIDEST_WEAVE_M * rng.uniform(), length, rng.uniform(0.0, math.tau)
     return Drive(profile, Curve(), height, pitch, body, *map(float, weave)), road
@@ -200,7 +200,7 @@ def draw_bends(
     while at < end:
         radius, side = m.log_uniform(rng, bounds), rng.choice([-1.0, 1.0])
         entry = min(30.0, radius * rng.uniform(0.2, 0.4))
-        # At most 60 degrees at a time: a road that turned back would run through itself.
+        # At most 69 degrees (1.2 rad) at a time: a road that turned back would run through itself.
         arc = min(rng.uniform(8.0, 80.0), radius * rng.uniform(0.2, 0.8))
         curvature = float(side / radius)
         for step, value in ((0.0, 0.0), (entry, curvature), (arc, curvature), (entry, 0.0)):

@@ -20,8 +20,6 @@ standard deviation within about a fifteenth."""
 NORMAL_MEDIAN = 0.6745
 """Median of |x| of a standard normal x."""
 OUTLIER, KEPT_VARIANCE = 3.0, 0.9733
-"""Standard deviations beyond which a residual is an outlier; variance of a normal x within them."""
-OUTLIER, KEPT_VARIANCE = 3.0, 0.9733
 """Standard deviations from which on a residual is an outlier; variance of a normal x within."""
 LEAST_NOISE_LSB = 1 / math.sqrt(12)
 """Rounding to words, which no sample is without."""

@@ -104,7 +104,8 @@ def open_places(country: float, town: float, park: float) -> tuple[Place, ...]:
     )
 
 
-# Under a roof the light is the overcast sky seen through an opening, and weather stays outside.
+# In garages and halls the light is the overcast sky seen through an opening, if there is one; under
+# a roof weather stays outside.
 SETTINGS: dict[Family, Setting] = {
     "sunny_road": Setting(open_places(0.50, 0.25, 0.25), lights.sunny, wet_share=0.15),
     "overcast_street": Setting(

@@ -33,7 +33,7 @@ class Route(Motion, Protocol):
     """A motion that knows the way it has covered, which wheels and legs go by."""
 
     def way_m(self, time_s: float) -> float:
-        """Way along the path since time 0, metres; negative before it."""
+        """Way along the path since some fixed moment, metres."""
 
 
 @dataclass(frozen=True)
@@ -98,3 +98,13 @@ def rotation(pose: Pose) -> np.ndarray:
     turned = np.array([[cy * cp, -sy, cy * sp], [sy * cp, cy, sy * sp], [-sp, 0.0, cp]])
     # Without roll the product below would only add rounding.
     return turned @ np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]]) if sr else turned
+
+
+def pose_of(turn: np.ndarray, position_m: tuple[float, float, float]) -> Pose:
+    """The pose whose `rotation` is the matrix `turn` [3, 3]."""
+    yaw = math.atan2(turn[1, 0], turn[0, 0])
+    pitch = math.atan2(-turn[2, 0], math.hypot(turn[0, 0], turn[1, 0]))
+    # About the axes that yaw and pitch have left: holds where the body stands on its nose as well.
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    roll = math.atan2(sin * turn[0, 2] - cos * turn[1, 2], cos * turn[1, 1] - sin * turn[0, 1])
+    return Pose(position_m, yaw, pitch, roll)

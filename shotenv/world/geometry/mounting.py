@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from shotenv.config import MountConfig
-from shotenv.world.geometry.motion import Motion, Pose, rotation
+from shotenv.world.geometry.motion import Motion, Pose, pose_of, rotation
 
 
 @dataclass(frozen=True)
@@ -22,7 +20,8 @@ class Mounted:
         """Pose of the camera at `time_s`."""
         car = self.car.at(time_s)
         turn = rotation(car)
-        return pose_of(turn @ rotation(self.place), turn @ self.place.position_m + car.position_m)
+        x, y, z = (turn @ self.place.position_m + car.position_m).tolist()
+        return pose_of(turn @ rotation(self.place), (x, y, z))
 
 
 def mounted(car: Motion, mount: MountConfig) -> Motion:
@@ -31,11 +30,3 @@ def mounted(car: Motion, mount: MountConfig) -> Motion:
     place = Pose(mount.position_m, *angles)
     # Through a matrix and back, angles would come out rounded.
     return car if place == Pose((0.0, 0.0, 0.0)) else Mounted(car, place)
-
-
-def pose_of(turn: np.ndarray, position_m: np.ndarray) -> Pose:
-    """The pose whose `rotation` is the matrix [3, 3] `turn`."""
-    x, y, z = (float(number) for number in position_m)
-    pitch = math.asin(float(np.clip(-turn[2, 0], -1.0, 1.0)))
-    yaw = math.atan2(turn[1, 0], turn[0, 0])
-    return Pose((x, y, z), yaw, pitch, math.atan2(turn[2, 1], turn[2, 2]))

@@ -12,7 +12,7 @@ import numpy as np
 
 from shotenv.world.geometry import meshes
 from shotenv.world.geometry.model import Mesh, MovingObject
-from shotenv.world.geometry.motion import Arc, Motion, Pose, Route, rotation
+from shotenv.world.geometry.motion import Arc, Motion, Pose, Route, pose_of, rotation
 from unwrap.support import Range
 
 HERE = Arc(Pose((0.0, 0.0, 0.0)))
@@ -41,16 +41,6 @@ def attached(body: Pose, hinge_m: meshes.Point, pitch_rad: float) -> Pose:
     turn = rotation(body)
     dx, dy, dz = (turn @ np.array(hinge_m)).tolist()
     return pose_of(turn @ rotation(Pose(hinge_m, pitch_rad=pitch_rad)), (x + dx, y + dy, z + dz))
-
-
-def pose_of(turn: np.ndarray, position_m: meshes.Point) -> Pose:
-    """The pose whose `rotation` is the matrix `turn` [3, 3]."""
-    yaw = math.atan2(turn[1, 0], turn[0, 0])
-    pitch = math.atan2(-turn[2, 0], math.hypot(turn[0, 0], turn[1, 0]))
-    # About the axes that yaw and pitch have left: holds where the body stands on its nose as well.
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    roll = math.atan2(sin * turn[0, 2] - cos * turn[1, 2], cos * turn[1, 1] - sin * turn[0, 1])
-    return Pose(position_m, yaw, pitch, roll)
 
 
 class Part(Protocol):
@@ -182,8 +172,8 @@ class Along:
     start_s, step_s : float
         Time of the first instant, and between two.
     ways_m, speeds_m_s : tuple of float
-        Way since time 0 and speed at the instants. Before the first and after the last one the
-        speed stays what it is there.
+        Way along the path, from its start, and speed at the instants. Before the first and after
+        the last one the speed stays what it is there.
     """
 
     path: Motion
@@ -197,7 +187,7 @@ class Along:
         return self.path.at(self.way_m(time_s))
 
     def way_m(self, time_s: float) -> float:
-        """Way along the path since time 0, metres: cubic Hermite between two instants."""
+        """Way along the path, metres: cubic Hermite between two instants."""
         steps = (time_s - self.start_s) / self.step_s
         last = len(self.ways_m) - 1
         i = int(min(max(steps, 0.0), last - 1.0))

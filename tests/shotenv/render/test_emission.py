@@ -69,8 +69,10 @@ def test_directions_are_drawn_wherever_it_shines(beam, name):
     drawn = beam.draw_directions(one, points)
     share = per_watt(beam, one, drawn.axes) / drawn.per_sr
     assert np.linalg.norm(drawn.axes, axis=1) == pytest.approx(1.0, abs=1e-5)
-    # Weighted by intensity over density they make the whole watt, and its mean direction.
+    # Weighted by intensity over density they make the whole watt, and its mean direction: ahead.
     assert share.mean() == pytest.approx(1.0, abs=5e-3)
+    aside = (share[:, None] * drawn.axes[:, 1:]).mean(axis=0)
+    assert aside == pytest.approx(np.zeros(2), abs=0.02)
     assert (share > 0).mean() > 0.9
 
 

@@ -55,7 +55,6 @@ def test_floor_beside_a_wall_is_lit_by_the_sky_that_the_wall_leaves(trace):
     share = (1 + away_m / np.hypot(away_m, tall_m)) / 2
     mean = images(trace, scene, CAMERA, range(24)).mean(axis=0)
     error = (mean / (ALBEDO * share) - 1)[on_floor]
-    print(np.abs(error).max(), error.mean())
     assert abs(error.mean()) < 0.005
     assert np.sqrt((error**2).mean()) < 0.015
 
@@ -133,7 +132,6 @@ def test_filter_takes_more_noise_than_it_brings_bias(trace, family, gain):
     bias = math.sqrt(max(0.0, float((halves[0] * halves[1]).mean())))
     noise, left = (image.std(axis=0, ddof=1)[lit] / mean[lit] for image in (off, on))
     removed = math.sqrt((noise**2).mean() - (left**2).mean())
-    print(family, bias, removed, np.median(noise), np.median(left))
     assert abs(sum(halves).mean()) / 2 < 0.005
     assert bias < 0.02
     assert bias < 0.5 * removed

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from shotenv.bank.clip_jobs import clip_jobs
+from shotenv.bank.clip_rendering import _seed
 from shotenv.config.bank import BankConfig, WorldConfig
 from shotenv.config.mounts import MountConfig
 from shotenv.world.geometry.motion import Arc, Pose, rotation
-from shotenv.world.geometry.mounting import mounted, pose_of
+from shotenv.world.geometry.mounting import mounted
 
 CAR = Arc(Pose((1.0, 2.0, 0.0), 0.4, 0.1, -0.05), 5.0, 0.3)
 
@@ -31,14 +32,6 @@ def test_a_camera_keeps_its_place_on_the_car():
         np.testing.assert_allclose(rotation(car).T @ rotation(pose), own, atol=1e-12)
 
 
-@pytest.mark.parametrize("angles", [(0.3, -0.8, 2.0), (-3.0, 1.2, -0.4), (0.0, 0.0, 0.0)])
-def test_a_pose_comes_back_from_its_matrix(angles):
-    pose = Pose((1.0, 2.0, 3.0), *angles)
-    back = pose_of(rotation(pose), np.array(pose.position_m))
-    np.testing.assert_allclose(rotation(back), rotation(pose), atol=1e-12)
-    assert back.position_m == pose.position_m
-
-
 def test_a_world_is_a_clip_for_each_camera(sensor, tmp_path):
     cameras = (MountConfig(name="front"), MountConfig(name="left", yaw_deg=90.0))
     one = BankConfig(name="cars", sensor=sensor)
@@ -50,6 +43,18 @@ def test_a_world_is_a_clip_for_each_camera(sensor, tmp_path):
     assert (front.seed, front.family, front.split) == (left.seed, left.family, left.split)
     assert [front.mount.name, left.mount.name] == ["front", "left"]
     assert math.isclose(left.mount.yaw_deg, 90.0)
+
+
+def test_cameras_of_one_world_have_noise_of_their_own_and_the_first_that_of_a_lone_one(
+    sensor, tmp_path
+):
+    cameras = (MountConfig(name="front"), MountConfig(name="left", yaw_deg=90.0))
+    one = BankConfig(name="cars", sensor=sensor)
+    two = one.model_copy(update={"world": WorldConfig(mounts=cameras)})
+    alone, front, left = (*clip_jobs(one, tmp_path)[:1], *clip_jobs(two, tmp_path)[:2])
+    seeds = [[_seed(job, number) for number in range(-1, 20)] for job in (alone, front, left)]
+    assert seeds[0] == seeds[1]
+    assert not set(seeds[1]) & set(seeds[2])
 
 
 def test_cameras_of_the_same_name_are_refused():
