@@ -109,7 +109,9 @@ def _measure(
         if kept is not None:
             seen = truth_m < sensor.max_range_m
             error_m = np.abs(kept.distance_of(frame).numpy()[seen] - truth_m[seen])
-            errors.append(float(np.mean(error_m / (error_m + ERROR_SCALE_M))) if seen.any() else 0)
+            # Unknown where nothing is in range.
+            error = np.mean(error_m / (error_m + ERROR_SCALE_M)) if seen.any() else np.nan
+            errors.append(float(error))
     return {
         "frames": clip.frames,
         "snr": {distance: np.concatenate(found) for distance, found in snr.items()},
@@ -140,7 +142,8 @@ def autocorrelation(series: list[np.ndarray]) -> dict[str, float]:
     """Autocorrelation of several series about their common mean, by lag: 1 never changes.
 
     Pairs that lie in one series are averaged over all series, and divided by the variance of all
-    values. Lags that no series reaches, and series without variance, are left out.
+    values. Values that are NaN are unknown. Lags that no series reaches, and series without
+    variance, are left out.
 
     Examples
     --------
@@ -148,13 +151,16 @@ def autocorrelation(series: list[np.ndarray]) -> dict[str, float]:
     -1.0
     """
     values = np.concatenate(series) if series else np.zeros(0)
+    values = values[~np.isnan(values)]
     if values.size == 0 or not (variance := float(np.var(values))):
         return {}
     mean, found = values.mean(), {}
     for lag in LAGS:
-        pairs = [(one[:-lag] - mean) * (one[lag:] - mean) for one in series if len(one) > lag]
-        if pairs:
-            found[str(lag)] = float(np.concatenate(pairs).mean() / variance)
+        pairs = [(one[:-lag] - mean) * (one[lag:] - mean) for one in series]
+        products = np.concatenate(pairs)
+        known = products[~np.isnan(products)]
+        if len(known):
+            found[str(lag)] = float(known.mean() / variance)
     return found
 
 

@@ -78,9 +78,12 @@ def _no_faces() -> np.ndarray:
 
 def _material_name(bsdf: Part) -> str:
     """The id of a BSDF, or of the first one within it that has one."""
-    while not bsdf.name and len(bsdf.parts) == 1:
-        bsdf = next(iter(bsdf.parts.values()))
-    return bsdf.name or NO_MATERIAL
+    while not bsdf.name:
+        inner = [part for part in bsdf.parts.values() if part.kind == "bsdf"]
+        if len(inner) != 1:
+            return NO_MATERIAL
+        bsdf = inner[0]
+    return bsdf.name
 
 
 def _surface(bsdf: Part) -> tuple[SurfaceConfig | None, str]:

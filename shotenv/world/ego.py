@@ -229,7 +229,9 @@ def draw_parking(
         profile = speeds_in_turn(0.0, [(starting, speed, rng.uniform(3.0, 9.0)),
                                        (braking, 0.0, 0.0)], begin)  # fmt: skip
         straight = float(rng.uniform(1.0, 4.0))
-        return profile, _turn(straight, straight + 7.0, curvature, reverse_from_m=0.0)
+        # It may be on its way out already when the clip begins.
+        leaves = profile.distance_m(min(begin, 0.0))
+        return profile, _turn(straight, straight + 7.0, curvature, reverse_from_m=leaves)
     if manner == "back in":
         # Past the place, then backwards into it; the gear is changed within the clip.
         change = float(rng.uniform(0.1, 0.5)) * duration_s

@@ -86,6 +86,9 @@ def _check_includes(path: Path, folder: Path, depth: int) -> None:
     if (size := path.stat().st_size) > LARGEST_XML_BYTES:
         raise SceneFileError(f"{path} has {size} bytes; expected at most {LARGEST_XML_BYTES}")
     content = path.read_bytes()
+    # In other encodings than those that hold ASCII the next look would see nothing.
+    if b"\0" in content:
+        raise SceneFileError(f"{path} is in UTF-16 or UTF-32; expected UTF-8")
     # Entities may stand for each other without end; Mitsuba's scenes have none.
     if b"<!" in content.replace(b"<!--", b"").replace(b"<![CDATA[", b""):
         raise SceneFileError(f"{path} has a document type or entities; expected neither")

@@ -30,6 +30,8 @@ def test_autocorrelation_of_noise_is_white_and_of_its_mean_over_four_a_triangle(
 def test_autocorrelation_compares_within_a_series_only():
     """Two clips, each constant: nothing changes within either, however short."""
     assert autocorrelation([np.zeros(3), np.ones(3)]) == {"1": 1.0, "2": 1.0}
+    # What is unknown is in no pair.
+    assert autocorrelation([np.array([np.nan, 0.0, 0.0, 0.0]), np.ones(3)]) == {"1": 1.0, "2": 1.0}
     assert autocorrelation([np.ones(3)]) == {}
     assert autocorrelation([]) == {}
 

@@ -110,6 +110,8 @@ def test_entities_and_other_roots_are_refused(tmp_path):
     path = tmp_path / "a.xml"
     path.write_text('<!DOCTYPE s [<!ENTITY a "b">]><scene version="3.0.0">&a;</scene>')
     assert "document type or entities" in refusal(path)
+    path.write_text(path.read_text(), encoding="utf-16")
+    assert "UTF-16 or UTF-32; expected UTF-8" in refusal(path)
     path.write_text('<shape version="3.0.0" type="sphere"/>')
     assert "expected a scene" in refusal(path)
 

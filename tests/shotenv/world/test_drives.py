@@ -9,6 +9,7 @@ from drawn_worlds import EVERY, plain_box
 
 from shotenv.config.bank import WorldConfig
 from shotenv.config.families import FAMILIES, SHIFT_FAMILIES
+from shotenv.world import ego as ego_drives
 from shotenv.world.draw import draw_world
 from shotenv.world.ego import ACCELERATION_M_S2, LANE_MANNERS, PARKING_MANNERS, draw_ego
 from shotenv.world.families.settings import SETTINGS
@@ -150,6 +151,20 @@ def test_a_car_that_reverses_turns_the_other_way():
     assert heading[1] < heading[0] - 0.5
     assert x[1] < x[0] - 3.0
     assert y[1] > 0.5
+
+
+def test_who_parks_is_as_fast_when_the_clip_begins_as_just_after(monkeypatch):
+    """Backwards too, where the car is on its way out already."""
+    begun = 0
+    for manner in PARKING_MANNERS:
+        monkeypatch.setattr(ego_drives, "PARKING_MANNERS", {manner: 1.0})
+        for seed in range(20):
+            rng = np.random.default_rng(seed)
+            drive = Drive(*ego_drives.draw_parking(rng, (1.0, 4.0), (0.0, 10.0), 2.0))
+            first, after = (ground_speed_m_s(drive, time) for time in (0.0, 0.02))
+            assert first == pytest.approx(after, abs=0.1)
+            begun += manner == "back out" and after < -0.1
+    assert begun > 2
 
 
 def test_braking_lowers_the_nose_and_nothing_shakes_at_rest():
