@@ -43,5 +43,6 @@ def test_numbers_of_worlds_are_those_of_the_configuration():
     ]
     told = r"(\d+) rendered worlds .*? plus (\d+) worlds .*?, (\d+) for testing and (\d+) of"
     assert [int(number) for number in re.search(told, CARD).groups()] == clips
-    assert f"World seeds 0 to {sum(clips) - 1};" in CARD
+    assert f"and {bank.clutter_clips} worlds of clutter" in CARD
+    assert f"World seeds 0 to {sum(clips) + bank.clutter_clips - 1};" in CARD
     assert f"the {bank.world.frames_per_clip * clips[0]} training frames" in CARD
