@@ -237,7 +237,7 @@ def _limit_threads(threads: int) -> None:
     except ImportError:
         return  # The first job that renders says so in a better way.
     drjit.set_thread_count(threads)
-    # NumPy's own threads wait for work by spinning: a fifth of a core for the lens of small images.
+    # NumPy's own threads wait for work by spinning: for the lens, an eighth of a worker's time.
     threadpool_limits(threads)
 
 
