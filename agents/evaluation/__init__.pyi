@@ -1,8 +1,5 @@
-from .headroom import (
-    check_solvable as check_solvable,
-    measure_problem as measure_problem,
-    print_problem as print_problem,
-)
+from .acceptance import judged as judged, print_problem as print_problem
+from .headroom import check_solvable as check_solvable, measure_problem as measure_problem
 from .play import (
     PlayedDrives as PlayedDrives,
     drive_seeds as drive_seeds,

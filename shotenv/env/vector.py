@@ -35,7 +35,6 @@ from shotenv.env.single import (
     feature_space,
     reward_space,
 )
-from unwrap.signal import Shots
 from unwrap.support import put, take
 
 
@@ -142,14 +141,6 @@ class ShotScheduleVectorEnv(VectorEnv):
             infos[row] = infos.get(row, {}) | info
         none = np.zeros(self.num_envs, dtype=bool)
         return self._observations(), rewards, none, truncated, self._batched(infos)
-
-    def error_of(self, shots: Shots) -> np.ndarray:
-        """Error term [N] that `shots` would bring in the current frames; nothing is played.
-
-        It does not depend on what is played, so it can serve as a control variate in training.
-        """
-        state = self._under_way()
-        return self._measure(self.problem, state.drive, state.step, shots).score.error.numpy()
 
     def _play(
         self, rows: np.ndarray, actions: torch.Tensor
