@@ -174,6 +174,9 @@ def _at_half_energy(fronts: dict[str, Front], study: StudyConfig) -> dict[str, A
     def interval(of: Callable[[np.ndarray], float]) -> dict[str, float]:
         return resampled(of, clusters, study).named("mean")
 
+    def error_of(front: Front) -> Callable[[np.ndarray], float]:
+        return lambda weight: front.error_at(HALF, weight)
+
     def energy_of(front: Front) -> Callable[[np.ndarray], float]:
         blind = fronts["best_blind"]
         return lambda weight: front.energy_at(blind.error_at(HALF, weight), weight)
@@ -183,10 +186,7 @@ def _at_half_energy(fronts: dict[str, Front], study: StudyConfig) -> dict[str, A
         return interval(lambda weight: 1 - a.error_at(HALF, weight) / b.error_at(HALF, weight))
 
     return {
-        "error_at_half_energy": {
-            name: interval(lambda weight, front=front: front.error_at(HALF, weight))
-            for name, front in fronts.items()
-        },
+        "error_at_half_energy": {name: interval(error_of(front)) for name, front in fronts.items()},
         "energy_at_equal_error": {
             name: interval(energy_of(front)) for name, front in fronts.items()
         },

@@ -121,7 +121,7 @@ class DriveTable:
         return after.tripped & ~before & (np.arange(self.cost.shape[-1]) > 0) & self.protect
 
     def granted(self, laser: ThermalState, actions: np.ndarray) -> np.ndarray:
-        """Actions [N] that are taken of those asked for: the next lower ones that are not barred."""
+        """Actions [N] that are taken of those asked for: the next lower that is not barred."""
         barred = self.barred(laser, self.consequences(laser))
         rows = np.arange(len(actions))
         for _ in range(barred.shape[-1] - 1):
