@@ -50,8 +50,7 @@ def evaluate_arguments(parser: ArgumentParser) -> None:
 def evaluate_network(arguments: Namespace) -> int:
     """Measure an unwrapping network."""
     from shotenv.bank import open_bank
-    from shotenv.config import env_config
-    from shotenv.dataset import measure_unwrapping, print_unwrapping
+    from shotenv.dataset import bench_config, measure_unwrapping, print_unwrapping
     from shotenv.decision import open_problem
     from unwrap import load_unwrapper
 
@@ -60,7 +59,7 @@ def evaluate_network(arguments: Namespace) -> int:
     # Every frame stands alone here: a bank of any frame rate will do.
     if (rendered := open_bank(arguments.bank).config) is not None:
         chosen["frame_rate_hz"] = rendered.world.frame_rate_hz
-    problem = open_problem(env_config(**chosen))
+    problem = open_problem(bench_config(**chosen))
     frames = sum(clip.frames for clip in problem.clips)
     with progress(frames, "unwrapping", "frame") as bar:
         found = measure_unwrapping(problem, tick=bar.update)

@@ -28,6 +28,7 @@ from .reader import (
     ConfigError as ConfigError,
     configs_dir as configs_dir,
     find_config as find_config,
+    merged as merged,
     one_sentence as one_sentence,
     read_config as read_config,
 )

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 import torch
-from agents.policies.guard import ThermalGuard
-from test_training import CONFIG, FRAMES, OPEN, make_envs, validate
+from test_training import CONFIG, FRAMES, NAMES, make_envs, validate
 
 from agents.evaluation.play import make_envs as make_shotenv, play_drives
 from agents.policies.fixed import FixedPolicy
@@ -29,9 +28,9 @@ def test_the_actor_learns_the_cheapest_actions_and_the_critic_stays(known):
     torch.manual_seed(0)
     network = build_network(2, CONFIG)
     before = {name: value.clone() for name, value in network.state_dict().items()}
-    assert validate(PpoPolicy(network, CONFIG, OPEN)) < 0.8
+    assert validate(PpoPolicy(network, CONFIG, NAMES)) < 0.8
     warm_start(network, known, seed=0)
-    assert validate(PpoPolicy(network, CONFIG, OPEN)) > 0.95
+    assert validate(PpoPolicy(network, CONFIG, NAMES)) > 0.95
     after = network.state_dict()
     kept = {name for name in before if torch.equal(before[name], after[name])}
     assert kept == {name for name in before if "value" in name}
@@ -49,7 +48,7 @@ def test_a_run_starts_warm_once_and_never_ends_worse(tmp_path, known):
         warm_start(network, known, seed=0)
 
     def trainer():
-        return Trainer(Sb3VecEnv(make_envs()), OPEN, FRAMES, CONFIG, validate, tmp_path, warm)
+        return Trainer(Sb3VecEnv(make_envs()), NAMES, FRAMES, CONFIG, validate, tmp_path, warm)
 
     assert validate(trainer().run()) > 0.95
     assert validate(trainer().run()) > 0.95
@@ -62,8 +61,8 @@ def test_known_costs_are_those_of_the_frames_they_stand_beside(
     monkeypatch.setenv("SHOTENV_CACHE", session_cache)
     config, seeds = env_config(**tiny_kwargs), [3, 4]
     envs = make_shotenv(config, "train", len(seeds), "Disabled")
-    guard, ticks = ThermalGuard(FEATURE_NAMES, (0.0, 1e3, 1e3)), []
-    known = known_frames(envs, seeds, guard, tick=ticks.append)
+    ticks = []
+    known = known_frames(envs, seeds, tick=ticks.append)
     frames = config.frames_per_drive
     shape = ROLLOUTS, len(seeds), frames
     assert len(known.observations) == len(known.cost) == np.prod(shape)
