@@ -48,6 +48,9 @@ def draw_table(seed, *, drives=6, frames=7, heat=(3.0, 8.0, 16.0), **changes):
     heat_j = np.array(heat) * rng.uniform(0.8, 1.2, (drives, 1))
     table = DriveTable(
         cost=cost,
+        reference=cost[..., 1],
+        error=cost,
+        depth_mae_m=4.0 * cost,
         laser_cost=np.zeros((drives, 3)),
         surplus=warming(0.0),
         tripped_cost=np.full((drives, frames), 3.0),
@@ -57,6 +60,7 @@ def draw_table(seed, *, drives=6, frames=7, heat=(3.0, 8.0, 16.0), **changes):
         span_k=(300.0, 360.0),
         highest_rise_k=0.0,
         advance=one_stage,
+        protect=False,
     )
     return dataclasses.replace(table, **changes)
 
@@ -76,6 +80,34 @@ def test_dynamic_programming_finds_the_optimum_of_every_sequence(seed):
     table = draw_table(seed, frames=6)
     # So fine a grid never prefers a wrong action: the costs are equal, not close.
     np.testing.assert_allclose(clairvoyant(table, levels=4001).cost, brute_force(table), atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sensor_that_protects_itself_has_its_optimum_too(seed):
+    table = draw_table(seed, frames=6, protect=True)
+    found = clairvoyant(table, levels=4001)
+    np.testing.assert_allclose(found.cost, brute_force(table), atol=1e-9)
+    assert found.tripped_share == 0.0
+    # Else protection is never asked for, and the test would hold without it.
+    assert not np.allclose(found.cost, brute_force(draw_table(seed, frames=6)))
+
+
+def test_protection_grants_the_next_lower_action_and_never_trips():
+    table = draw_table(3, frames=50, protect=True)
+    free = dataclasses.replace(table, protect=False)
+    assert play(free, always(2)).tripped_share > 0.0
+    played = play(table, always(2))
+    assert played.tripped_share == 0.0
+    laser, seen = table.start(), set()
+    for frame in range(50):
+        taken = played.actions[:, frame]
+        trips = table.consequences(laser).tripped
+        for drive, action in enumerate(taken):
+            assert action == 0 or not trips[drive, action]
+            assert trips[drive, action + 1 :].all()
+        seen |= set(taken.tolist())
+        laser = table.advance(laser, table.heat_j[np.arange(6), taken])
+    assert seen == {0, 1, 2}
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -29,10 +29,13 @@ def test_the_page_shows_the_table_of_features():
 def test_what_each_number_of_samples_tells():
     names = [feature.name for feature in SEEN_FEATURES]
     assert not TOLD[0].any() and TOLD[Shots.EIGHT].all()
-    assert [name for name, told in zip(names, TOLD[Shots.FOUR], strict=True) if not told] == [
-        "disagreement"
-    ]
-    assert [name for name, told in zip(names, TOLD[Shots.TWO], strict=True) if not told] == [
-        "residual",
-        "disagreement",
-    ]
+    untold = {
+        shots: [name for name, told in zip(names, TOLD[shots], strict=True) if not told]
+        for shots in Shots
+    }
+    regrets = ["regret_of_two", "regret_of_four"]
+    assert untold == {
+        Shots.TWO: ["residual", "two_from_four", *regrets],
+        Shots.FOUR: regrets,
+        Shots.EIGHT: [],
+    }

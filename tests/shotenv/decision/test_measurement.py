@@ -8,9 +8,9 @@ import pytest
 import torch
 
 from shotenv.config.keywords import env_config
-from shotenv.decision.acquire import acquire_depth, offset_to_subtract_lsb
+from shotenv.decision.acquire import acquire_depth, acquire_depths, offset_to_subtract_lsb
 from shotenv.decision.features import SEEN_FEATURES
-from shotenv.decision.measurement import measure_by_shots, measure_frames
+from shotenv.decision.measurement import measure_by_shots, measure_frames, measure_prefixes
 from shotenv.decision.problem import open_problem
 from shotenv.decision.transition import reset, step
 from unwrap.signal.shots import Shots
@@ -43,15 +43,61 @@ def test_every_drive_is_measured_with_its_own_shots(problem):
 def test_what_few_shots_cannot_tell_stays_as_more_told_it(problem):
     state, _ = step(problem, reset(problem, [1, 2]), torch.tensor([2, 1]))
     first = state.seen.features
-    residual, disagreement = NAMES.index("residual"), NAMES.index("disagreement")
+    residual, regret = NAMES.index("residual"), NAMES.index("regret_of_two")
     assert (first[:, residual] > 0).all()
-    assert first[0, disagreement] > 0 and first[1, disagreement] == 0
+    assert first[0, regret] > 0 and first[1, regret] == 0
     state, _ = step(problem, state, torch.tensor([0, 0]))
     second = state.seen.features
-    assert torch.equal(second[:, [residual, disagreement]], first[:, [residual, disagreement]])
+    assert torch.equal(second[:, [residual, regret]], first[:, [residual, regret]])
     assert not torch.equal(second[:, NAMES.index("amplitude")], first[:, NAMES.index("amplitude")])
     assert state.seen.since_four.tolist() == [1, 1]
     assert state.seen.since_eight.tolist() == [1, 1002]
+
+
+def test_regret_is_the_error_term_between_prefixes_of_one_frame(problem):
+    """Computed by hand from the depths of the first 2, the first 4 and all samples."""
+    state = reset(problem, [1])
+    scale_m = problem.config.reward.error_scale_m
+    two, four, eight = acquire_depths(problem, state.drive, state.step, tuple(Shots))
+    strong = eight.depth.valid
+    found = measure_frames(problem, state.drive, state.step, Shots.EIGHT).features[0]
+    for name, one, other in (
+        ("regret_of_two", two, eight),
+        ("regret_of_four", four, eight),
+        ("two_from_four", two, four),
+    ):
+        apart_m = (one.depth.distance_m - other.depth.distance_m).abs()[strong].double()
+        expected = 4 * (apart_m / (apart_m + scale_m)).mean()
+        assert found[NAMES.index(name)].item() == pytest.approx(expected.item(), rel=1e-5)
+    # Each depth is that of an acquisition of so many samples alone.
+    for one, shots in ((two, Shots.TWO), (four, Shots.FOUR)):
+        alone = acquire_depth(problem, state.drive, state.step, shots)
+        assert torch.equal(one.depth.distance_m, alone.depth.distance_m)
+        assert torch.equal(one.depth.valid, alone.depth.valid)
+
+
+def test_the_reference_is_the_error_of_four_whatever_is_taken(problem):
+    state = reset(problem, [1, 2])
+    four = measure_frames(problem, state.drive, state.step, Shots.FOUR).score.error
+    for shots in Shots:
+        found = measure_frames(problem, state.drive, state.step, shots)
+        assert torch.equal(found.error_of_four, four)
+    by_shots = measure_by_shots(
+        problem, state, torch.tensor([0, 2]), state.drive.laser_power_w, measure_frames
+    )
+    assert torch.equal(by_shots.error_of_four, four)
+
+
+def test_prefixes_measure_as_acquisitions_of_their_own(problem):
+    state = reset(problem, [3])
+    for shots, found in zip(
+        Shots, measure_prefixes(problem, state.drive, state.step), strict=True
+    ):
+        alone = measure_frames(problem, state.drive, state.step, shots)
+        told = [feature.least_shots <= shots for feature in SEEN_FEATURES]
+        assert torch.equal(found.features[:, told], alone.features[:, told])
+        assert torch.equal(found.score.error, alone.score.error)
+        assert torch.equal(found.error_of_four, alone.error_of_four)
 
 
 def test_the_stored_offset_is_needed_with_two_samples_alone(problem):

@@ -75,7 +75,7 @@ def cost_where(one, **values):
     return ShotCost(**{name: values.get(name, 0.0) * one for name in fields})
 
 
-def test_reward_is_minus_the_weighted_terms():
+def test_reward_is_what_is_saved_against_four_samples():
     one = torch.ones(1, dtype=torch.float64)
     cost = cost_where(one, energy_j=2.0, duty=0.02)
     eight = cost_where(one, energy_j=5.0, duty=0.08)
@@ -86,8 +86,12 @@ def test_reward_is_minus_the_weighted_terms():
         "power": 0.4,
         "tripped": 1.0,
     }
-    weights = RewardConfig(error=2.0, duty=0.4, power=0.5, trip=0.3)
-    assert reward(terms, weights).item() == pytest.approx(-(2.0 + 0.1 + 0.2 + 0.3))
+    weights = RewardConfig(error=2.0, duty=0.4, power=0.5, trip=0.3, scale=10.0)
+    reference = {"error": 0.1 * one, "duty": 0.5 * one, "power": 0.6 * one, "tripped": 0.0 * one}
+    # The price is each drive's own, not that of the weights.
+    taken, four = 2.0 + 0.1 + 0.4 * 0.25 + 0.3, 0.2 + 0.2 + 0.6 * 0.25
+    found = reward(terms, reference, 0.25 * one, weights)
+    assert found.item() == pytest.approx(10.0 * (four - taken))
 
 
 def test_means_are_the_same_on_any_number_of_threads():
@@ -215,7 +219,7 @@ def test_the_table_holds_what_each_step_pays(problem):
 
 def test_a_hot_laser_trips_delivers_nothing_and_comes_back(tiny_kwargs):
     fragile = {"trip_k": 311.5, "release_k": 311.0, "thermal_time_constant_s": 0.5}
-    problem = open_problem(env_config(**tiny_kwargs, laser=fragile))
+    problem = open_problem(env_config(**tiny_kwargs, laser=fragile, protect=False))
     state, table_reward = reset(problem, [1]), None
     tripped, shots = [], []
     for _ in range(32):
@@ -223,7 +227,7 @@ def test_a_hot_laser_trips_delivers_nothing_and_comes_back(tiny_kwargs):
         tripped.append(bool(outcome.tripped))
         shots.append(int(outcome.shots))
         if outcome.tripped:
-            table_reward = outcome.reward.item()
+            table_reward = len(tripped) - 1, outcome.reward.item()
             assert outcome.terms["error"].item() == 1.0
             assert outcome.score.valid_share.item() == 0.0
             assert outcome.cost.laser_energy_j.item() == 0.0
@@ -232,7 +236,55 @@ def test_a_hot_laser_trips_delivers_nothing_and_comes_back(tiny_kwargs):
     # It came back at least once.
     assert any(a and not b for a, b in pairwise(tripped))
     table = outcomes_of_all_actions(problem, state.drive)
-    assert table_reward == table.tripped_reward
+    frame, paid = table_reward
+    assert paid == table.tripped_reward[frame].item()
+
+
+def test_a_sensor_that_protects_itself_grants_less_and_never_trips(tiny_kwargs):
+    warm = {"trip_k": 311.5, "release_k": 311.0, "thermal_resistance_k_per_w": 30.0}
+    problem = open_problem(env_config(**tiny_kwargs, laser=warm))
+    state, taken = reset(problem, [1]), []
+    for _ in range(32):
+        allowed = allowed_actions(problem, state)[0].tolist()
+        state, outcome = step(problem, state, torch.tensor([2]))
+        assert int(outcome.asked) == 8 and not outcome.tripped
+        taken.append(int(outcome.shots))
+        # The highest action that is allowed as it is: what was asked for, or the next lower.
+        assert taken[-1] == SHOTS_OF_ACTION[max(a for a in range(3) if allowed[a])]
+    assert {2, 4, 8} >= set(taken) and 8 in taken and min(taken) < 8
+
+
+def test_always_four_with_a_cool_laser_returns_zero(problem):
+    state = reset(problem, [5, 6])
+    for _ in range(8):
+        state, outcome = step(problem, state, torch.tensor([1, 1]))
+        assert outcome.reward.tolist() == [0.0, 0.0]
+
+
+def test_the_price_is_drawn_for_each_drive_and_seen(tiny_kwargs):
+    config = env_config(**tiny_kwargs, reward={"power": [0.01, 0.1]})
+    problem = open_problem(config)
+    state = reset(problem, list(range(200)))
+    price = state.drive.power_price
+    assert 0.01 <= price.min() < 0.012 and 0.085 < price.max() <= 0.1
+    # Log-uniform: half of them lie below the geometric mean.
+    assert (price < 0.01**0.5 * 0.1**0.5).double().mean().item() == pytest.approx(0.5, abs=0.1)
+    seen = observe(problem, state)[:, list(FEATURE_NAMES).index("power_price")].double()
+    torch.testing.assert_close(seen, price / (price + 0.05), rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("power", "says"),
+    [
+        ([0.2, 0.1], "expected low <= high"),
+        ([0.0, 0.1], "begins above 0"),
+        (-0.1, "expected finite weights >= 0"),
+        ("dear", "power"),
+    ],
+)
+def test_prices_that_cannot_be_drawn_are_refused(power, says):
+    with pytest.raises(ConfigError, match=says):
+        env_config(reward={"power": power})
 
 
 def test_observations_stay_in_their_box_and_follow_the_state(problem):
@@ -246,8 +298,8 @@ def test_observations_stay_in_their_box_and_follow_the_state(problem):
     assert second[:, names.index("last_eight")].tolist() == [1.0, 0.0]
     assert second[:, names.index("since_eight")][0] == 0.0
     assert second[:, names.index("since_eight")][1] > 0.9
-    assert second[0, names.index("disagreement")] > 0.0
-    assert second[1, names.index("disagreement")] == 0.0
+    assert second[0, names.index("regret_of_four")] > 0.0
+    assert second[1, names.index("regret_of_four")] == 0.0
     assert torch.isfinite(second).all() and second.abs().max() <= LIMIT
 
 
