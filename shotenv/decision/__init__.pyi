@@ -3,7 +3,7 @@ from .acquire import (
     acquire_depth as acquire_depth,
     noise_of as noise_of,
 )
-from .drive import Drive as Drive, draw_drive as draw_drive
+from .drive import Drive as Drive, DriveOptions as DriveOptions, draw_drive as draw_drive
 from .features import (
     FEATURE_NAMES as FEATURE_NAMES,
     FEATURES as FEATURES,
