@@ -154,6 +154,8 @@ def paint_lanes(problem: Problem, trace: Trace, width: int) -> Image.Image:
         return lambda value: top + (LANE_PX - 1) * (1.0 - (value - low) / (high - low))
 
     y = lane(0, "shots", 0.0, float(Shots.EIGHT))
+    for place, (shots, color) in enumerate(SHOTS_COLORS.items()):
+        pen.text((44 + 14 * place, y(4.0) - FONT_PX // 2), str(shots or "off"), color, font)
     for frame, shots in enumerate(trace.shots):
         # A frame without laser is as high as two samples, so that it is seen.
         height = shots or 2
@@ -165,7 +167,9 @@ def paint_lanes(problem: Problem, trace: Trace, width: int) -> Image.Image:
     for name, limit_k in (("trip", laser.trip_k), ("ambient", ambient_k)):
         pen.line((left, y(limit_k), width - GAP_PX, y(limit_k)), fill=FAINT)
         words = f"{name} {limit_k - ZERO_C_K:.0f} C"
-        pen.text((left + 4, y(limit_k)), words, FAINT, font, "la" if name == "trip" else "ls")
+        # Between the two lines, and not on them.
+        down, anchor = (2, "la") if name == "trip" else (-3, "ls")
+        pen.text((left + 4, y(limit_k) + down), words, FAINT, font, anchor)
     points = [(x(frame), y(k)) for frame, k in enumerate(trace.temperature_k)]
     if len(points) > 1:
         pen.line(points, fill=(255, 110, 90), width=2)
