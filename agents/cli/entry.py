@@ -16,6 +16,7 @@ from jsonargparse import ArgumentError, Namespace
 from agents.cli import (
     bank_commands,
     doctor_command,
+    play_command,
     problem_command,
     schedule_commands,
     unwrap_commands,
@@ -28,6 +29,7 @@ COMMANDS: tuple[Command, ...] = (
     *doctor_command.COMMANDS,
     *schedule_commands.COMMANDS,
     *problem_command.COMMANDS,
+    *play_command.COMMANDS,
     *bank_commands.COMMANDS,
     *unwrap_commands.COMMANDS,
 )

@@ -3,7 +3,9 @@ from .headroom import (
     measure_problem as measure_problem,
     print_problem as print_problem,
 )
+from .match import Match as Match, Tally as Tally
 from .play import (
+    FIXED_POLICIES as FIXED_POLICIES,
     PlayedDrives as PlayedDrives,
     drive_seeds as drive_seeds,
     make_envs as make_envs,

@@ -8,3 +8,4 @@ from .vector import (
     MOShotScheduleVectorEnv as MOShotScheduleVectorEnv,
     ShotScheduleVectorEnv as ShotScheduleVectorEnv,
 )
+from .window import Window as Window
