@@ -17,7 +17,7 @@ from torch import Tensor
 from shotenv.bank import Bank
 from shotenv.config import Family
 from shotenv.decision import TERMS, Outcome, Problem, State
-from shotenv.laser import ENERGY_PARTS, too_bright
+from shotenv.laser import too_bright
 
 Columns = dict[str, Any]
 """Infos of a batch B: an array [B, ...] for each key, or again `Columns`."""
@@ -73,7 +73,7 @@ def violated(played: Played) -> Tensor:
 
 # One line for each, however long: name, unit, meaning and formula are read together.
 # fmt: off
-ENTRIES = (
+INFO_ENTRIES = (
     Entry("drive_seed", "1", "seed of the drive; `options={\"drive\": seed}` plays it again", lambda p: p.before.drive.seed),
     Entry("laser_power_w", "W", "optical power of this drive's laser while on", lambda p: p.before.drive.laser_power_w),
     Entry("integration_s", "s", "integration time of a sample in this drive", lambda p: p.before.drive.integration_s),
@@ -84,7 +84,11 @@ ENTRIES = (
     Entry("shots", "1", "samples taken; 0 without laser", lambda p: p.outcome.shots, 0),
     Entry("duty", "1", "share of the frame in which the laser was on", lambda p: p.outcome.cost.duty, 0.0),
     Entry("energy_j", "J", "energy of the frame, the sum of its parts", lambda p: p.outcome.cost.energy_j, 0.0),
-    *(Entry(name, "J", f"that of the {name.removesuffix('_energy_j')}", lambda p, n=name: getattr(p.outcome.cost, n), 0.0) for name in ENERGY_PARTS),  # type: ignore[misc]
+    Entry("laser_energy_j", "J", "electrical energy of the laser", lambda p: p.outcome.cost.laser_energy_j, 0.0),
+    Entry("driver_energy_j", "J", "of the modulation driver", lambda p: p.outcome.cost.driver_energy_j, 0.0),
+    Entry("readout_energy_j", "J", "of the readouts, that of the gray image too", lambda p: p.outcome.cost.readout_energy_j, 0.0),
+    Entry("static_energy_j", "J", "of the imager standing by", lambda p: p.outcome.cost.static_energy_j, 0.0),
+    Entry("network_energy_j", "J", "of network compute", lambda p: p.outcome.cost.network_energy_j, 0.0),
     Entry("power_w", "W", "`energy_j` over the frame period", lambda p: p.outcome.cost.energy_j / p.problem.frame_period_s, 0.0),
     Entry("life_used_h", "h", "what the frame took of the laser's rated life", lambda p: p.outcome.cost.life_used_h, 0.0),
     Entry("depth_mae_m", "m", "mean absolute error of the valid scored pixels", lambda p: p.outcome.score.depth_mae_m, 0.0),
@@ -96,7 +100,7 @@ ENTRIES = (
 )
 """All plain numbers of `info`; `reward_terms` and `vector_reward` stand beside them."""
 # fmt: on
-INFO_KEYS = (*(entry.name for entry in ENTRIES), "reward_terms", "vector_reward")
+INFO_KEYS = (*(entry.name for entry in INFO_ENTRIES), "reward_terms", "vector_reward")
 
 
 def family_names(bank: Bank) -> tuple[str, ...]:
@@ -131,7 +135,7 @@ def info_columns(
     played = Played(problem, family_codes, before, after or before, outcome)
     batch = len(before.step)
     columns: Columns = {}
-    for entry in ENTRIES:
+    for entry in INFO_ENTRIES:
         if outcome is None and entry.at_start is not None:
             columns[entry.name] = np.full(batch, entry.at_start)
         else:

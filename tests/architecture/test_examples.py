@@ -56,7 +56,7 @@ def test_the_quickstart_runs(small_env, capsys):
     exec((ROOT / "examples" / "quickstart.py").read_text("utf-8"), {})
     *rows, last = capsys.readouterr().out.splitlines()
     assert len(rows) == 3
-    assert re.fullmatch(r"return -\d+\.\d", last)
+    assert re.fullmatch(r"return -?\d+\.\d", last)
 
 
 @pytest.mark.parametrize("name", WITH_EXAMPLES)
