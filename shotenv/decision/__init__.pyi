@@ -12,7 +12,7 @@ from .features import (
     feature_index as feature_index,
     heat_margin_k as heat_margin_k,
 )
-from .measurement import measure_frames as measure_frames
+from .measurement import Measure as Measure, measure_frames as measure_frames
 from .measurement_cache import MeasurementCache as MeasurementCache
 from .observation import observe as observe
 from .outcomes import Outcomes as Outcomes, outcomes_of_all_actions as outcomes_of_all_actions

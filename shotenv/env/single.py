@@ -35,6 +35,7 @@ from shotenv.env.arguments import (
     spec_of_drives,
     term_space,
 )
+from shotenv.env.counterfactuals import no_outcomes, outcome_columns
 from shotenv.env.drive_order import DriveOrder, check_drives
 from shotenv.env.image_observation import depth_images, gray_images, no_depth_images
 from shotenv.env.info import family_codes, family_names, info_columns, info_of
@@ -60,6 +61,8 @@ class ShotScheduleEnv(gymnasium.Env[Any, np.int64]):
     remember
         Keep what was measured (`MeasurementCache`): the same numbers, faster where drives come
         again.
+    outcomes
+        Tell in `info["outcomes"]` what every action would have brought: three times the work.
     **fields
         Fields of `shotenv.config.env.EnvConfig` as plain JSON values, such as `bank="starter"`,
         `split="test"`, `reward={"power": 0.04}`, `laser={"efficiency": 0.45}`.
@@ -90,6 +93,7 @@ class ShotScheduleEnv(gymnasium.Env[Any, np.int64]):
         render_mode: str | None = None,
         drives: int | None = None,
         remember: bool = False,
+        outcomes: bool = False,
         **fields: Any,
     ) -> None:
         self.observation = check_choice("observation", observation, OBSERVATIONS)
@@ -97,6 +101,7 @@ class ShotScheduleEnv(gymnasium.Env[Any, np.int64]):
             check_choice("render_mode", render_mode, RENDER_MODES)
         self.render_mode = render_mode
         self._drives = check_drives(drives)
+        self._outcomes = outcomes
         self.problem = open_problem(env_config(config, **fields))
         if observation == "image":
             check_every_pixel(self.problem, 'observation="image"')
@@ -146,6 +151,8 @@ class ShotScheduleEnv(gymnasium.Env[Any, np.int64]):
             self._trace = Trace.start(state)
             self._show_human()
         columns = info_columns(self.problem, self._family_codes, state)
+        if self._outcomes:
+            columns["outcomes"] = no_outcomes(columns)
         return self._observed(state), info_of(columns, 0)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
@@ -175,6 +182,10 @@ class ShotScheduleEnv(gymnasium.Env[Any, np.int64]):
             )
             self._show_human()
         columns = info_columns(self.problem, self._family_codes, before, after, outcome)
+        if self._outcomes:
+            columns["outcomes"] = outcome_columns(
+                self.problem, self._family_codes, before, self._measure
+            )
         truncated = bool(outcome.truncated)
         return self._observed(after), self._reward(outcome), False, truncated, info_of(columns, 0)
 

@@ -39,6 +39,7 @@ from shotenv.env.arguments import (
     spec_of_drives,
     term_space,
 )
+from shotenv.env.counterfactuals import no_outcomes, outcome_columns
 from shotenv.env.drive_order import DriveOrder, check_drives
 from shotenv.env.image_observation import depth_images, gray_images, no_depth_images
 from shotenv.env.info import (
@@ -66,7 +67,7 @@ class ShotScheduleVectorEnv(VectorEnv):
     ----------
     num_envs
         Drives in the batch.
-    config, observation, drives, remember, **fields
+    config, observation, drives, remember, outcomes, **fields
         As for `ShotScheduleEnv`.
     render_mode
         None or "rgb_array".
@@ -86,6 +87,7 @@ class ShotScheduleVectorEnv(VectorEnv):
         render_mode: str | None = None,
         drives: int | None = None,
         remember: bool = False,
+        outcomes: bool = False,
         max_episode_steps: int | None = None,
         **fields: Any,
     ) -> None:
@@ -96,6 +98,7 @@ class ShotScheduleVectorEnv(VectorEnv):
             check_choice("render_mode", render_mode, RENDER_MODES)
         self.render_mode = render_mode
         self._drives = check_drives(drives)
+        self._outcomes = outcomes
         self.problem = open_problem(env_config(config, **fields))
         check_length(max_episode_steps, self.problem.config.frames_per_drive)
         if observation == "image":
@@ -232,6 +235,10 @@ class ShotScheduleVectorEnv(VectorEnv):
         if self.observation == "image":
             self._last_depth[rows] = depth_images(self.problem, part, outcome.shots)
         columns = info_columns(self.problem, self._family_codes, part, after, outcome)
+        if self._outcomes:
+            columns["outcomes"] = outcome_columns(
+                self.problem, self._family_codes, part, self._measure
+            )
         if self.render_mode is not None:
             told = ("shots", "temperature_k", "laser_energy_j")
             for place, row in enumerate(rows.tolist()):
@@ -257,7 +264,10 @@ class ShotScheduleVectorEnv(VectorEnv):
         if self.render_mode is not None:
             for place, row in enumerate(rows.tolist()):
                 self._traces[row] = Trace.start(take(fresh, torch.tensor([place])))
-        return info_columns(self.problem, self._family_codes, fresh)
+        columns = info_columns(self.problem, self._family_codes, fresh)
+        if self._outcomes:
+            columns["outcomes"] = no_outcomes(columns)
+        return columns
 
     def _final(self, columns: Columns, rows: np.ndarray) -> dict[str, Any]:
         """Last infos and observations of the drives `rows`, as gymnasium has them."""
