@@ -15,6 +15,7 @@ from jsonargparse import ArgumentError, Namespace
 
 from agents.cli import (
     bank_commands,
+    collect_command,
     doctor_command,
     play_command,
     problem_command,
@@ -30,6 +31,7 @@ COMMANDS: tuple[Command, ...] = (
     *schedule_commands.COMMANDS,
     *problem_command.COMMANDS,
     *play_command.COMMANDS,
+    *collect_command.COMMANDS,
     *bank_commands.COMMANDS,
     *unwrap_commands.COMMANDS,
 )

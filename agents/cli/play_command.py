@@ -78,7 +78,7 @@ def play(arguments: Namespace) -> int:
     from agents.evaluation import Match
     from shotenv.env import Window
 
-    rival, config = rival_of(arguments.against), experiment_of(arguments)
+    rival, config = policy_of("against", arguments.against), experiment_of(arguments)
     env = config.env.model_copy(update={"split": config.study.split})
     window = Window(arguments.pace or POLLS_PER_S)
     try:
@@ -93,23 +93,24 @@ def play(arguments: Namespace) -> int:
     return DONE
 
 
-def rival_of(against: str) -> Policy:
-    """The policy that `--against` names.
+def policy_of(argument: str, name: str) -> Policy:
+    """The policy that `--argument` names.
 
     Raises
     ------
     ConfigError
-        It is neither a fixed choice nor the folder of a scheduler.
+        It is neither random nor a fixed choice nor the folder of a scheduler.
     """
     from agents.evaluation import FIXED_POLICIES
-    from agents.policies import load_policy
+    from agents.policies import RandomPolicy, load_policy
 
-    if against in FIXED_POLICIES:
-        return FIXED_POLICIES[against]
-    if not Path(against).is_dir():
-        known = ", ".join(FIXED_POLICIES)
-        raise ConfigError(f"against is {against!r}; expected {known} or a scheduler's folder")
-    return load_policy(against)
+    known: dict[str, Policy] = {"random": RandomPolicy(), **FIXED_POLICIES}
+    if name in known:
+        return known[name]
+    if not Path(name).is_dir():
+        listed = ", ".join(known)
+        raise ConfigError(f"{argument} is {name!r}; expected {listed} or a scheduler's folder")
+    return load_policy(name)
 
 
 def play_match(match: Match, window: Any, rival: str, *, waits: bool) -> None:

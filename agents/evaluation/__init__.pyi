@@ -1,3 +1,8 @@
+from .episodes import (
+    play_episodes as play_episodes,
+    require_minari as require_minari,
+    write_dataset as write_dataset,
+)
 from .headroom import (
     check_solvable as check_solvable,
     measure_problem as measure_problem,

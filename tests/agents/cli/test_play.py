@@ -7,7 +7,7 @@ import json
 import pytest
 
 from agents.cli.entry import main
-from agents.cli.play_command import Controls, play_match, rival_of
+from agents.cli.play_command import Controls, play_match, policy_of
 from agents.evaluation.match import Match
 from agents.policies.fixed import FixedPolicy
 from shotenv.config.keywords import env_config
@@ -59,10 +59,10 @@ def test_a_pause_stops_the_drive(match):
 
 
 def test_a_rival_that_there_is_not_is_named(tmp_path):
-    with pytest.raises(ConfigError, match="against is 'never_8'; expected always_2, always_4"):
-        rival_of("never_8")
+    with pytest.raises(ConfigError, match="against is 'never_8'; expected random, always_2"):
+        policy_of("against", "never_8")
     with pytest.raises(ValueError, match="holds no scheduler"):
-        rival_of(str(tmp_path))
+        policy_of("against", str(tmp_path))
 
 
 def test_a_drive_is_played_in_a_window(tiny_kwargs, tmp_path, capsys, monkeypatch):
