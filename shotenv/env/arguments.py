@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import torch
 from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
+from gymnasium.vector import AutoresetMode
 
 from shotenv.decision import FEATURES, LIMIT, TERMS, Problem
 from unwrap.signal import Shots
@@ -132,3 +134,64 @@ def check_length(max_episode_steps: int | None, frames_per_drive: int) -> None:
             f"max_episode_steps is {max_episode_steps!r} and frames_per_drive {frames_per_drive}; "
             "set frames_per_drive alone"
         )
+
+
+def check_count(num_envs: Any) -> int:
+    """Number of environments in a batch.
+
+    Raises
+    ------
+    ValueError
+        It is no whole number of at least 1.
+    """
+    if not isinstance(num_envs, int) or num_envs < 1:
+        raise ValueError(f"num_envs is {num_envs!r}; expected a whole number of at least 1")
+    return num_envs
+
+
+def check_autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
+    """Gymnasium's mode of this name.
+
+    Raises
+    ------
+    ValueError
+        It has none.
+    """
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        known = ", ".join(repr(known.value) for known in AutoresetMode)
+        raise ValueError(f"autoreset_mode is {mode!r}; expected one of {known}") from None
+
+
+def check_seeds(seed: int | Sequence[int | None] | None, num_envs: int) -> Sequence[int | None]:
+    """Seed of each environment of a batch: of an int s those from s on.
+
+    Raises
+    ------
+    ValueError
+        Another number of seeds than environments.
+    """
+    if seed is None:
+        return [None] * num_envs
+    if isinstance(seed, int | np.integer):
+        return [int(seed) + row for row in range(num_envs)]
+    if len(seed) != num_envs:
+        raise ValueError(f"seed has {len(seed)} values; expected {num_envs}")
+    return seed
+
+
+def check_reset_mask(mask: Any, num_envs: int) -> np.ndarray:
+    """Which environments of a batch begin a new drive, bool [num_envs]; None is all.
+
+    Raises
+    ------
+    ValueError
+        It is no such array, or no environment begins.
+    """
+    if mask is None:
+        return np.ones(num_envs, dtype=bool)
+    fits = isinstance(mask, np.ndarray) and mask.shape == (num_envs,)
+    if not fits or mask.dtype != bool or not mask.any():
+        raise ValueError(f"reset_mask is {mask!r}; expected a bool array of {num_envs} with a True")
+    return mask

@@ -31,9 +31,13 @@ from shotenv.env.arguments import (
     ACTIONS,
     OBSERVATIONS,
     check_actions,
+    check_autoreset_mode,
     check_choice,
+    check_count,
     check_every_pixel,
     check_length,
+    check_reset_mask,
+    check_seeds,
     objective_space,
     observation_space,
     spec_of_drives,
@@ -92,8 +96,8 @@ class ShotScheduleVectorEnv(VectorEnv):
         **fields: Any,
     ) -> None:
         self.observation = check_choice("observation", observation, OBSERVATIONS)
-        self.num_envs = _check_count(num_envs)
-        self.autoreset_mode = _check_mode(autoreset_mode)
+        self.num_envs = check_count(num_envs)
+        self.autoreset_mode = check_autoreset_mode(autoreset_mode)
         if render_mode is not None:
             check_choice("render_mode", render_mode, RENDER_MODES)
         self.render_mode = render_mode
@@ -144,8 +148,10 @@ class ShotScheduleVectorEnv(VectorEnv):
             sequence with one seed per environment. Drives that begin by auto-reset are drawn.
         """
         chosen = check_options(options, self.problem, self.num_envs, also=("reset_mask",))
-        rows = np.flatnonzero(self._check_reset_mask(options))
-        for row, value in enumerate(self._check_seeds(seed)):
+        mask = check_reset_mask((options or {}).get("reset_mask"), self.num_envs)
+        # At first all drives begin, whatever is masked.
+        rows = np.arange(self.num_envs) if self.state is None else np.flatnonzero(mask)
+        for row, value in enumerate(check_seeds(seed, self.num_envs)):
             # A row that goes on with its drive leaves its seed unused: its next stays the same.
             if value is not None and row in rows:
                 self._generators[row] = seeding.np_random(value)[0]
@@ -174,6 +180,7 @@ class ShotScheduleVectorEnv(VectorEnv):
         resting = self._over.copy()
         rewards = self._no_rewards()
         playing, restarted = np.flatnonzero(~resting), np.flatnonzero(resting)
+        # Rows and what is told of them: of those that play, and of those that begin a new drive.
         parts: list[tuple[np.ndarray, Columns]] = []
         if len(playing):
             told, rewards[playing] = self._play(playing, chosen)
@@ -181,11 +188,12 @@ class ShotScheduleVectorEnv(VectorEnv):
         truncated = self._over & ~resting
         final: dict[str, Any] = {}
         if self.autoreset_mode == AutoresetMode.SAME_STEP and truncated.any():
-            # All are as old as each other or not: the rows that are over restart within this step.
+            # No row rests in this mode, so that `told` is of all of them. Those that are over begin
+            # anew within this step, and what was told of their last frame goes to `final_info`.
             restarted = np.flatnonzero(truncated)
             final = self._final(rows_of(told, restarted), restarted)
-            going = ~truncated[playing]
-            parts = [(playing[going], rows_of(told, going))]
+            going = np.flatnonzero(~truncated)
+            parts = [(going, rows_of(told, going))]
         if len(restarted):
             parts.append((restarted, self._restart(restarted)))
         rows, columns = merged_columns(parts)
@@ -300,25 +308,6 @@ class ShotScheduleVectorEnv(VectorEnv):
         image = np.concatenate((gray[:, None], self._last_depth), axis=1)
         return {"image": image, "state": features}
 
-    def _check_seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, int | np.integer):
-            return [int(seed) + row for row in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise ValueError(f"seed has {len(seed)} values; expected {self.num_envs}")
-        return seed
-
-    def _check_reset_mask(self, options: dict[str, Any] | None) -> np.ndarray:
-        everything = np.ones(self.num_envs, dtype=bool)
-        mask = (options or {}).get("reset_mask", everything)
-        fits = isinstance(mask, np.ndarray) and mask.shape == (self.num_envs,)
-        if not fits or mask.dtype != bool or not mask.any():
-            raise ValueError(
-                f"reset_mask is {mask!r}; expected a bool array of {self.num_envs} with a True"
-            )
-        return everything if self.state is None else mask
-
 
 class MOShotScheduleVectorEnv(ShotScheduleVectorEnv):
     """`MOShotScheduleEnv` for `num_envs` drives at a time: rewards float32 [N, objectives]."""
@@ -334,17 +323,3 @@ class MOShotScheduleVectorEnv(ShotScheduleVectorEnv):
 
     def _no_rewards(self) -> np.ndarray:
         return np.zeros((self.num_envs, len(TERMS)), np.float32)
-
-
-def _check_count(num_envs: Any) -> int:
-    if not isinstance(num_envs, int) or num_envs < 1:
-        raise ValueError(f"num_envs is {num_envs!r}; expected a whole number of at least 1")
-    return num_envs
-
-
-def _check_mode(mode: str | AutoresetMode) -> AutoresetMode:
-    try:
-        return AutoresetMode(mode)
-    except ValueError:
-        known = ", ".join(repr(known.value) for known in AutoresetMode)
-        raise ValueError(f"autoreset_mode is {mode!r}; expected one of {known}") from None
