@@ -157,9 +157,7 @@ def main(config: Config) -> dict[str, float]:
         ahead = returns["trained"] - each
         # Standard error over drives; those that share clips are not independent.
         error = ahead.std() / len(ahead) ** 0.5
-        print(
-            f"{name:9} {each.mean():8.2f} a drive; trained is ahead by {ahead.mean():+.2f} +- {error:.2f}"
-        )
+        print(f"{name:9} {each.mean():8.2f} a drive; trained {ahead.mean():+.2f} +- {error:.2f}")
     return {name: float(each.mean()) for name, each in returns.items()}
 
 

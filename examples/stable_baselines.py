@@ -51,9 +51,7 @@ def main(
 
     test = gym.make("shotenv/ShotSchedule-v0", drives=drives, **{**chosen, "split": "test"})
     mean, deviation = evaluate_policy(model, Monitor(test), n_eval_episodes=drives)
-    print(
-        f"{algorithm}: {mean:.2f} a drive on {drives} test drives (standard deviation {deviation:.2f})"
-    )
+    print(f"{algorithm}: {mean:.2f} a drive, standard deviation {deviation:.2f}")
     return mean
 
 
