@@ -244,3 +244,10 @@ def row_of_single(info: dict[str, Any]) -> dict[str, Any]:
         key: row_of_single(value) if isinstance(value, dict) else np.asarray(value).tolist()
         for key, value in info.items()
     }
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_the_id_may_bring_its_import_along(name, tiny_kwargs):
+    """For processes that have not imported the package, such as those that others start."""
+    assert gymnasium.make(f"shotenv:{name}", **tiny_kwargs).spec.id == name
+    assert gymnasium.make_vec(f"shotenv:{name}", 2, **tiny_kwargs).spec.id == name

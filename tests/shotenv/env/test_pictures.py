@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+import types
+
 import gymnasium
 import numpy as np
 import pytest
@@ -100,25 +103,40 @@ def test_a_window_shows_the_same_picture(tiny_kwargs, monkeypatch):
 
 
 def test_without_pygame_the_window_says_what_to_install(tiny_kwargs, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "pygame", None)
+    monkeypatch.setitem(sys.modules, "pygame", None)
     env = make(tiny_kwargs, render_mode="human")
     with pytest.raises(ImportError, match=r"pip install 'shotenv\[play\]'"):
         env.reset(seed=0)
 
 
-def test_a_film_is_recorded(tiny_kwargs, tmp_path):
+def test_a_film_is_recorded(tiny_kwargs, tmp_path, monkeypatch):
+    """With a stand-in for moviepy, which allows no Pillow of today: the frames that it is given."""
+    films = []
+
+    class Clip:
+        def __init__(self, frames, fps):
+            films.append((frames, fps))
+
+        def write_videofile(self, path, **options):
+            assert path.endswith(".mp4")
+
+    module = types.SimpleNamespace(ImageSequenceClip=Clip)
+    for name in ("moviepy", "moviepy.video", "moviepy.video.io"):
+        monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
+    monkeypatch.setitem(sys.modules, "moviepy.video.io.ImageSequenceClip", module)
     env = gymnasium.wrappers.RecordVideo(
-        make(tiny_kwargs),
-        str(tmp_path / "films"),
-        episode_trigger=lambda episode: True,
-        disable_logger=True,
+        make(tiny_kwargs), str(tmp_path / "films"), episode_trigger=lambda episode: True
     )
     env.reset(seed=0)
     for _ in range(FRAMES):
         env.step(1)
     env.close()
-    (film,) = tmp_path.glob("films/*.mp4")
-    assert film.stat().st_size > 1000
+    ((frames, fps),) = films
+    assert len(frames) == FRAMES + 1 and fps == 10
+    # Codecs want even sizes.
+    assert all(frame.dtype == np.uint8 for frame in frames)
+    assert {tuple(size % 2 for size in frame.shape[:2]) for frame in frames} == {(0, 0)}
+    assert not np.array_equal(frames[0], frames[-1])
 
 
 @pytest.mark.parametrize(

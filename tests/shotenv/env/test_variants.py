@@ -104,20 +104,14 @@ def test_rewards_of_a_vector_of_objectives(tiny_kwargs):
         assert np.array_equal(rewards, -infos["vector_reward"]) and rewards.any() == (step < 2)
 
 
-# It registers environments whose packages are not installed, and warns of them.
-@pytest.mark.filterwarnings("ignore")
-def test_mo_gymnasium_takes_it(tiny_kwargs):
-    import mo_gymnasium
-    from mo_gymnasium.wrappers import LinearReward, MORecordEpisodeStatistics
-
-    env = mo_gymnasium.make(shotenv.MO_ENV_ID, **tiny_kwargs)
-    env = MORecordEpisodeStatistics(env)
+def test_weights_times_objectives_are_a_reward(tiny_kwargs):
+    """What the wrappers of mo-gymnasium do with it."""
     weights = np.array([1.0, 0.0, 0.04, 0.5])
-    scalar = LinearReward(env, weight=weights)
-    scalar.reset(seed=0)
-    _, reward, _, _, info = scalar.step(2)
-    # Its `vector_reward` is the reward itself, and takes the place of ours.
-    assert reward == pytest.approx(weights @ info["vector_reward"])
+    env = gymnasium.wrappers.TransformReward(
+        make(shotenv.MO_ENV_ID, tiny_kwargs), lambda reward: float(weights @ reward)
+    )
+    env.reset(seed=0)
+    _, reward, _, _, info = env.step(2)
     assert reward == pytest.approx(-weights @ list(info["reward_terms"].values()))
 
 
