@@ -29,6 +29,7 @@ def _register(env_id: str, faces: str, **arguments: Any) -> None:
 # Without `max_episode_steps`: it could not follow `frames_per_drive`, and gymnasium would cut
 # longer drives. Environments end their drives themselves and put the length into their `spec`.
 _register(ENV_ID, "ShotSchedule")
-_register(IMAGE_ENV_ID, "ShotSchedule", kwargs={"observation": "image"})
+# Images need a bank with every pixel, whatever the default of the others is.
+_register(IMAGE_ENV_ID, "ShotSchedule", kwargs={"observation": "image", "bank": "starter"})
 # Gymnasium's checker would warn of each reward that it is no single number.
 _register(MO_ENV_ID, "MOShotSchedule", disable_env_checker=True)
