@@ -1,7 +1,6 @@
 from .policies import (
     CyclePolicy as CyclePolicy,
     FixedPolicy as FixedPolicy,
-    GuardedPolicy as GuardedPolicy,
     Policy as Policy,
     PpoPolicy as PpoPolicy,
     RandomPolicy as RandomPolicy,

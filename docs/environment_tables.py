@@ -9,7 +9,7 @@ import re
 from pathlib import Path
 from typing import Any, get_args
 
-from shotenv.config import EnvConfig, env_config
+from shotenv.config import EnvConfig, RewardConfig, env_config
 from shotenv.decision import FEATURES, TERMS
 from shotenv.env import INFO_ENTRIES
 
@@ -18,7 +18,9 @@ PAGE = Path(__file__).with_name("environment.md")
 
 def rows(heading: tuple[str, ...], cells: list[tuple[str, ...]]) -> str:
     """A table of Markdown."""
-    lines = [f"| {' | '.join(row)} |" for row in (heading, *cells)]
+    # A bar in a cell would begin another.
+    escaped = [[cell.replace("|", "\\|") for cell in row] for row in (heading, *cells)]
+    lines = [f"| {' | '.join(row)} |" for row in escaped]
     return "\n".join([lines[0], "|---" * len(heading) + "|", *lines[1:]])
 
 
@@ -64,7 +66,17 @@ def arguments() -> str:
     return rows(("argument", "default", "meaning"), cells)
 
 
-TABLES = {"features": features, "info": info, "arguments": arguments}
+def weights() -> str:
+    """Fields of the reward."""
+    reward = env_config().reward
+    cells = [
+        (f"`{name}`", f"`{getattr(reward, name)}`", field.description or "")
+        for name, field in RewardConfig.model_fields.items()
+    ]
+    return rows(("of `reward`", "default", "meaning"), cells)
+
+
+TABLES = {"weights": weights, "features": features, "info": info, "arguments": arguments}
 
 
 def filled(page: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from jsonargparse import Namespace
+from jsonargparse import ArgumentParser, Namespace
 
 from agents.cli.command import DONE, Command, write_numbers
 from agents.cli.experiment import (
@@ -14,9 +14,26 @@ from agents.cli.experiment import (
 from unwrap.support import progress
 
 
+def add_problem(parser: ArgumentParser) -> None:
+    """The experiment, and which goals it is held to."""
+    add_experiment(parser)
+    parser.add_argument(
+        "--goals",
+        choices=["default", "hot"],
+        default="default",
+        help="goals of the default problem, or of one in which heat binds",
+    )
+
+
 def measure_configuration(arguments: Namespace) -> int:
     """Measure the decision problem."""
-    from agents.evaluation import check_solvable, drive_seeds, measure_problem, print_problem
+    from agents.evaluation import (
+        check_solvable,
+        drive_seeds,
+        judged,
+        measure_problem,
+        print_problem,
+    )
     from agents.optimum import tabulate
     from shotenv.decision import open_problem
 
@@ -24,18 +41,23 @@ def measure_configuration(arguments: Namespace) -> int:
     check_solvable(config.env.laser)  # before minutes are spent
     prepare_bank(config.env)
     play_on_one_thread()
-    counts = {"validation": config.study.tuning_drives, config.study.split: config.study.drives}
+    counts = {
+        "train": config.study.drives,
+        "validation": config.study.tuning_drives,
+        config.study.split: config.study.drives,
+    }
     frames = sum(counts.values()) * config.env.frames_per_drive
     problems = {
         split: open_problem(config.env.model_copy(update={"split": split})) for split in counts
     }
     with progress(frames, "playing every action in every frame", "frame") as bar:
-        validation, test = (
+        training, validation, test = (
             tabulate(problems[split], drive_seeds(config.study, count), tick=bar.update)
             for split, count in counts.items()
         )
     # Policies are tuned on validation clips and judged on those of the study's split.
-    found = measure_problem(validation, test, config.env.reward, config.study)
+    measured = measure_problem(training, validation, test, config.env.reward, config.study)
+    found = judged(measured, heat_binds=arguments.goals == "hot")
     print_problem(found, config)
     write_numbers(arguments, found)
     return DONE
@@ -45,7 +67,7 @@ COMMANDS = (
     Command(
         "problem",
         "measure how much there is to win in the decision problem",
-        add_experiment,
+        add_problem,
         measure_configuration,
     ),
 )

@@ -21,11 +21,6 @@ class AgentConfig(Section):
     gae_lambda: Fraction = Field(0.95, description="lambda of the advantage estimate")
     entropy_coefficient: NonNegative = Field(0.005, description="weight of the policy's entropy")
     hidden: tuple[int, ...] = Field((64, 64), description="hidden layers of policy and value")
-    guard: NonNegative = Field(
-        1.0,
-        description="margin to the trip that shots need, in the most that they can warm the laser "
-        "by in a frame; 0 = no guard",
-    )
     warm_start: bool = Field(
         True, description="whether to start from the known costs of all actions in the drives"
     )

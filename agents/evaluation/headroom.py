@@ -1,25 +1,32 @@
-"""How much there is to win in the decision problem: the clairvoyant optimum against simple rules.
+"""How much there is to win in the decision problem, and whether fewer shots pay in it.
 
-Cost is minus the return; excess is how much more than the optimum a policy costs over all drives.
+Cost is the weighted sum of the reward's terms; excess is how much more than the optimum a policy
+costs over all drives. Intervals are over clips: drives pass the same ones again and again.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
 
-from agents.config import DemoConfig, StudyConfig
-from agents.evaluation.statistics import excess, mean, study_interval
+from agents.config import StudyConfig
+from agents.evaluation.foresight import foresee
+from agents.evaluation.statistics import excess, ratio, resampled, study_interval
 from agents.optimum import (
     DriveTable,
+    Front,
     PlayedTable,
     Possible,
     always,
     best_choice,
     best_rule,
     blind_choices,
+    blind_front,
+    by_clip,
     clairvoyant,
+    front_of,
     greedy,
     play,
     threshold,
@@ -27,18 +34,10 @@ from agents.optimum import (
 from shotenv.config import LaserConfig, RewardConfig
 from unwrap.signal import Shots
 
-# Assumed: what there must be to gain for learning a scheduler to be worth its while.
-GOALS: Final = {
-    "best_fixed": 0.15,
-    "best_blind": 0.12,
-    "threshold_rule": 0.05,
-    "greedy": 0.05,
-}
-"""Least excess over the optimum of each kind of policy, for the problem to be worth solving."""
-LEAST_SHARE: Final = 0.10
-"""Of the optimum's frames, for each action."""
-# Assumed: from free energy to prices at which always 2 DCS are the optimum.
-SWEEP: Final = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8)
+HALF: Final = 0.5
+"""Of the laser energy of always-8: where errors are compared."""
+# Assumed, from free energy to prices at which always 2 DCS are the optimum.
+SWEEP: Final = (0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
 
 
 def check_solvable(laser: LaserConfig) -> None:
@@ -57,14 +56,18 @@ def check_solvable(laser: LaserConfig) -> None:
 
 
 def measure_problem(
-    validation: Possible, test: Possible, weights: RewardConfig, study: StudyConfig
+    training: Possible,
+    validation: Possible,
+    test: Possible,
+    weights: RewardConfig,
+    study: StudyConfig,
 ) -> dict[str, Any]:
-    """The acceptance numbers of the decision problem on test drives, with intervals.
+    """What the decision problem is like on test drives, with intervals.
 
     Parameters
     ----------
-    validation, test : Possible
-        Drives that tune the rule, and drives that are judged.
+    training, validation, test : Possible
+        Drives that teach what can be foreseen, that tune the rule, and that are judged.
     weights : RewardConfig
         Weights of the reward.
     study : StudyConfig
@@ -81,35 +84,53 @@ def measure_problem(
     favours them; the rule is tuned on the validation drives.
     """
     check_solvable(test.problem.config.laser)
-    table = test.table(weights)
+    table, clips = test.table(weights), test.clips()
     best = clairvoyant(table)
-    rivals = _rivals(validation.table(weights), table)
-    found: dict[str, dict[str, Any]] = {
+
+    def per_clip(values: np.ndarray) -> np.ndarray:
+        return by_clip(values, clips)
+
+    found = {
         name: {
             "choice": choice,
-            **study_interval(excess, study, played.cost, best.cost).named("excess"),
-            "goal": GOALS.get(name),
+            **study_interval(
+                excess, study, per_clip(played.frame_cost), per_clip(best.frame_cost)
+            ).named("excess"),
         }
-        for name, (choice, played) in rivals.items()
+        for name, (choice, played) in _rivals(validation.table(weights), table).items()
     }
-    working = np.maximum((best.actions >= 0).sum(axis=1), 1)  # frames with laser, of each drive
-    shares = {
-        str(shots): study_interval(
-            mean, study, (best.actions == shots.action).sum(axis=1) / working
-        ).named("mean")
-        for shots in Shots
-    }
+    working = per_clip((best.actions >= 0).astype(float))
+    taken = np.maximum(best.actions, 0)[..., None]
+    depth_mae_m = np.take_along_axis(table.depth_mae_m, taken, axis=-1)[..., 0]
+    error = np.take_along_axis(table.error, taken, axis=-1)[..., 0]
+    fronts = _fronts(training, test, table, clips)
     return {
         "drives": len(best.cost),
+        "clips": len(working),
         "optimum": {
-            "cost_per_drive": study_interval(mean, study, best.cost).named("mean"),
-            "shots_share": shares,
+            "cost_per_drive": float(best.cost.mean()),
+            "return_per_drive": float(weights.scale * (table.reference.sum(1) - best.cost).mean()),
+            "shots_share": {
+                str(shots): study_interval(
+                    ratio, study, per_clip((best.actions == shots.action).astype(float)), working
+                ).named("mean")
+                for shots in Shots
+            },
+            "laser_energy_share": float(best.energy_share),
+            "depth_mae_m": study_interval(ratio, study, per_clip(depth_mae_m), working).named(
+                "mean"
+            ),
             "tripped_share": best.tripped_share,
         },
+        "fixed": _fixed(table),
         "excess": found,
-        "holds": all(one["goal"] is None or one["excess"] >= one["goal"] for one in found.values())
-        and all(share["mean"] >= LEAST_SHARE for share in shares.values()),
-        "sweep": [_at_weight(test, weights, power) for power in SWEEP],
+        "cost_share_of_energy": float(1.0 - error.sum() / best.cost.sum()),
+        **_at_half_energy(fronts, study),
+        "fronts": {name: _listed(front) for name, front in fronts.items()},
+        "held_back_drives_share": _held_back(table),
+        "frame_explains": frame_explains(test),
+        "families": _by_family(test, best),
+        "sweep": [_at_price(test, weights, price) for price in SWEEP],
     }
 
 
@@ -133,48 +154,109 @@ def _rivals(validation: DriveTable, table: DriveTable) -> dict[str, tuple[str, P
     }
 
 
-def _at_weight(test: Possible, weights: RewardConfig, power: float) -> dict[str, Any]:
-    """What another weight of power makes of the problem."""
-    table = test.table(weights.model_copy(update={"power": power}))
+def _fronts(
+    training: Possible, test: Possible, table: DriveTable, clips: np.ndarray
+) -> dict[str, Front]:
+    """What knowing all, nothing, and what the sensor tells with and without looking reach."""
+    with_looking, without = (foresee(training, looking=looking) for looking in (True, False))
+    return {
+        "clairvoyant": front_of(table.error, table, clips),
+        "regression": front_of(with_looking.errors(test), table, clips),
+        "regression_without_looking": front_of(without.errors(test), table, clips),
+        "best_blind": blind_front(table, clips),
+    }
+
+
+def _at_half_energy(fronts: dict[str, Front], study: StudyConfig) -> dict[str, Any]:
+    """Errors at half of always-8's energy; the energy at which each errs as blind choices there."""
+    clusters = len(fronts["best_blind"].frames)
+
+    def interval(of: Callable[[np.ndarray], float]) -> dict[str, float]:
+        return resampled(of, clusters, study).named("mean")
+
+    def error_of(front: Front) -> Callable[[np.ndarray], float]:
+        return lambda weight: front.error_at(HALF, weight)
+
+    def energy_of(front: Front) -> Callable[[np.ndarray], float]:
+        blind = fronts["best_blind"]
+        return lambda weight: front.energy_at(blind.error_at(HALF, weight), weight)
+
+    def less_than(one: str, other: str) -> dict[str, float]:
+        a, b = fronts[one], fronts[other]
+        return interval(lambda weight: 1 - a.error_at(HALF, weight) / b.error_at(HALF, weight))
+
+    return {
+        "error_at_half_energy": {name: interval(error_of(front)) for name, front in fronts.items()},
+        "energy_at_equal_error": {
+            name: interval(energy_of(front)) for name, front in fronts.items()
+        },
+        "clairvoyant_below_blind": less_than("clairvoyant", "best_blind"),
+        "worth_of_looking": less_than("regression", "regression_without_looking"),
+    }
+
+
+def _listed(front: Front) -> list[dict[str, float]]:
+    points = zip(*front.points(np.ones(len(front.frames))), strict=True)
+    return [{"laser_energy_share": float(e), "depth_mae_m": float(m)} for e, m in points]
+
+
+def _fixed(table: DriveTable) -> dict[str, dict[str, float]]:
+    """What each fixed choice brings with a laser that never trips."""
+    return {
+        str(shots): {
+            "depth_mae_m": float(table.depth_mae_m[..., shots.action].mean()),
+            "error": float(table.error[..., shots.action].mean()),
+        }
+        for shots in Shots
+    }
+
+
+def _held_back(table: DriveTable) -> float:
+    """Share of drives in which heat keeps a scheduler that always asks for 8 DCS from them."""
+    played = play(table, always(Shots.EIGHT.action))
+    return float((played.actions < Shots.EIGHT.action).any(axis=1).mean())
+
+
+def frame_explains(possible: Possible) -> dict[str, float]:
+    """Share of the variance of what 8 DCS gain that the bank frame explains, over drives.
+
+    What is left is laser power, integration time, imager and noise: with 1 the best choice could be
+    looked up by frame. From the variance within frames that several drives pass, without bias.
+    """
+    frames = np.concatenate([drive.frames[0, :-1].numpy() for drive in possible.drives])
+    error = np.concatenate([one.terms["error"].numpy() for one in possible.outcomes])
+    _, number, count = np.unique(frames, return_inverse=True, return_counts=True)
+    explained = {}
+    for shots in (Shots.TWO, Shots.FOUR):
+        gain = error[:, shots.action] - error[:, Shots.EIGHT.action]
+        means = np.bincount(number, gain) / count
+        left = np.square(gain - means[number])[count[number] > 1].sum()
+        freedom = (count[count > 1] - 1).sum()
+        within = left / freedom if freedom else 0.0
+        explained[str(shots)] = float(1.0 - within / max(gain.var(), 1e-12))
+    return explained
+
+
+def _by_family(possible: Possible, best: PlayedTable) -> dict[str, list[float]]:
+    """Shares of 2, 4 and 8 DCS in the optimum, by the family of the scene."""
+    bank = possible.problem.bank
+    families = np.array([bank.clips[clip].family for clip in possible.clips().ravel()])
+    actions = best.actions.ravel()
+    return {
+        str(family): [float(np.mean(actions[families == family] == n.action)) for n in Shots]
+        for family in np.unique(families)
+    }
+
+
+def _at_price(test: Possible, weights: RewardConfig, price: float) -> dict[str, Any]:
+    """What another price of power makes of the problem."""
+    table = test.table(weights, price=price)
     best = clairvoyant(table)
     costs = {shots: play(table, always(shots.action)).cost.sum() for shots in Shots}
     cheapest = min(Shots, key=costs.__getitem__)
     return {
-        "power": power,
+        "power": price,
         "shots_share": best.shares.tolist(),
         "best_fixed": f"always {cheapest}",
         "best_fixed_excess": float(costs[cheapest] / best.cost.sum() - 1.0),
     }
-
-
-def print_problem(found: dict[str, Any], config: DemoConfig) -> None:
-    """The numbers that `measure_problem` found for `config`, as text."""
-    optimum, env = found["optimum"], config.env
-    measured = f"bank {env.bank}, unwrapper {env.unwrapper}, laser {env.laser.name}"
-    weights = ", ".join(f"{name} {value:g}" for name, value in env.reward.model_dump().items())
-    drives = f"{found['drives']} {config.study.split} drives"
-    print(f"{measured}; reward: {weights}")
-    print(f"Clairvoyant optimum over {drives} ({config.study.confidence:.0%} intervals)")
-    for shots, share in optimum["shots_share"].items():
-        print(
-            f"  {shots} DCS in {share['mean']:6.1%} of frames  "
-            f"({share['low']:.1%} to {share['high']:.1%}; goal at least {LEAST_SHARE:.0%})"
-        )
-    print(f"  laser off in {optimum['tripped_share']:.1%} of frames")
-    print("\nWhat others cost more than the optimum")
-    for name, one in found["excess"].items():
-        print(
-            f"  {name.replace('_', ' '):15}{one['excess']:6.1%}  "
-            f"({one['low']:.1%} to {one['high']:.1%}; goal at least {one['goal']:.0%})  "
-            f"{one['choice']}"
-        )
-    print(
-        "\nWeight of power   shares of 2 / 4 / 8 in the optimum   best fixed choice and its excess"
-    )
-    for row in found["sweep"]:
-        shares = " / ".join(f"{share:4.0%}" for share in row["shots_share"])
-        print(
-            f"  {row['power']:<16g}{shares:37}{row['best_fixed']}, {row['best_fixed_excess']:.1%}"
-        )
-    held = "holds" if found["holds"] else "DOES NOT hold"
-    print(f"\nThis problem ({measured}) {held} every goal.")

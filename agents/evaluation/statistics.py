@@ -1,4 +1,8 @@
-"""Bootstrap intervals over drives: every policy is judged on the same drives, so pairs count."""
+"""Bootstrap intervals of paired samples.
+
+Drives that pass the same clips are no independent trials. Where clips are known they are what is
+resampled, each as a whole (a cluster).
+"""
 
 from __future__ import annotations
 
@@ -11,6 +15,8 @@ from scipy.stats import bootstrap
 from agents.config import StudyConfig
 
 Statistic = Callable[..., np.ndarray]
+MOST_DRAWS = 2000
+"""Of `resampled`, whose statistics are computed one by one."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +48,36 @@ def excess(cost: np.ndarray, reference: np.ndarray, axis: int = -1) -> np.ndarra
     return np.sum(cost, axis=axis) / np.sum(reference, axis=axis) - 1.0
 
 
+def ratio(total: np.ndarray, count: np.ndarray, axis: int = -1) -> np.ndarray:
+    """Mean of what adds up to `total` [C] over `count` [C] frames of each clip."""
+    return np.sum(total, axis=axis) / np.sum(count, axis=axis)
+
+
+def resampled(
+    statistic: Callable[[np.ndarray], float], clusters: int, study: StudyConfig, *, seed: int = 0
+) -> Interval:
+    """Percentile bootstrap interval of a statistic of how often each cluster counts.
+
+    For statistics that are no plain sums, such as the error at a given energy.
+
+    Parameters
+    ----------
+    statistic : callable
+        Of weights float64 [C]: all 1 for the point estimate, else how often each was drawn.
+    clusters : int
+        Their number C.
+    study : StudyConfig
+        Draws, of which `MOST_DRAWS` at most are made, and confidence.
+    """
+    draws = np.random.default_rng(seed).multinomial(
+        clusters, np.full(clusters, 1 / clusters), size=min(study.bootstrap_draws, MOST_DRAWS)
+    )
+    values = [statistic(weight.astype(np.float64)) for weight in draws]
+    tail = (1.0 - study.confidence) / 2.0
+    low, high = np.quantile(values, (tail, 1.0 - tail))
+    return Interval(statistic(np.ones(clusters)), float(low), float(high))
+
+
 def study_interval(statistic: Statistic, study: StudyConfig, *samples: np.ndarray) -> Interval:
     """`interval` with the draws and the confidence of a study."""
     return interval(statistic, *samples, draws=study.bootstrap_draws, confidence=study.confidence)
@@ -61,7 +97,7 @@ def interval(
     statistic : callable
         `statistic(*samples, axis)`, such as `mean`, `mean_difference` or `excess`.
     samples : float [N] each
-        One value per drive; the drives of all samples are the same and resampled together.
+        One value per drive, or per clip; those of all samples are the same and resampled together.
     draws, confidence, seed
         Number of resamples, coverage, and the seed of the resampling.
 

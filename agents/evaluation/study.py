@@ -18,13 +18,10 @@ from agents.evaluation.summary import summary
 from agents.optimum import best_rule, tabulate
 from agents.policies import (
     CyclePolicy,
-    FixedPolicy,
-    GuardedPolicy,
     Policy,
     PpoPolicy,
     RandomPolicy,
     SnrThresholdPolicy,
-    thermal_guard,
 )
 from shotenv.decision import FEATURE_NAMES, open_problem
 from unwrap.support import progress
@@ -69,7 +66,6 @@ def baselines(config: DemoConfig) -> dict[str, Policy]:
         "snr_threshold": tune_rule(config),
         "cycle": CyclePolicy(4, shots=8, otherwise=2),  # assumed: 3.5 samples a frame
         "random": RandomPolicy(config.study.seed),
-        "always_8_guarded": GuardedPolicy(FixedPolicy(8), thermal_guard(config)),
         **FIXED_POLICIES,
     }
 

@@ -6,5 +6,11 @@ from .choices import (
     threshold as threshold,
 )
 from .dynamic import clairvoyant as clairvoyant, greedy as greedy
+from .fronts import (
+    Front as Front,
+    blind_front as blind_front,
+    by_clip as by_clip,
+    front_of as front_of,
+)
 from .outcome_table import DriveTable as DriveTable, PlayedTable as PlayedTable, play as play
 from .tabulation import Possible as Possible, drive_of as drive_of, tabulate as tabulate

@@ -43,8 +43,10 @@ def clairvoyant(table: DriveTable, *, levels: int = 801, rise_levels: int = 25) 
     def choose(now: Situation) -> np.ndarray:
         """Action of least cost now plus least cost from then on."""
         # Bellman's equation at the laser's true temperature: the grid enters by `to_go` alone.
-        to_go = _look_up(values[now.frame + 1], _corners(grid, table.consequences(now.laser)))
-        return np.argmin(now.cost + to_go, axis=-1)
+        after = table.consequences(now.laser)
+        to_go = _look_up(values[now.frame + 1], _corners(grid, after))
+        barred = table.barred(now.laser, after)
+        return np.argmin(np.where(barred, np.inf, now.cost + to_go), axis=-1)
 
     return play(table, choose)
 
@@ -88,11 +90,13 @@ def _values_to_go(table: DriveTable, grid: _Grid) -> np.ndarray:
     values = np.zeros((frames + 1, 2, *shape))
     on, off = (grid.everywhere(drives, tripped=tripped) for tripped in (False, True))
     # Where a grid point ends up one frame later does not depend on the frame: found once.
-    warmed = _corners(grid, table.consequences(on))
+    after = table.consequences(on)
+    # What is not granted is the same as asking for less: it need not be looked at.
+    warmed, barred = _corners(grid, after), table.barred(on, after)
     cooled = _corners(grid, table.advance(off, np.zeros(off.case_k.shape)))
     for frame in reversed(range(frames)):
         cost, to_go = table.cost_at(frame, on.temperature_k), values[frame + 1]
-        working = np.min(cost + _look_up(to_go, warmed), axis=-1)
+        working = np.min(np.where(barred, np.inf, cost + _look_up(to_go, warmed)), axis=-1)
         tripped = table.tripped_cost[:, frame, None] + _look_up(to_go, cooled)
         values[frame] = working.reshape(shape), tripped.reshape(shape)
     return values

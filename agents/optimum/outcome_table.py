@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from unwrap.signal import Shots
+
 # A policy on a table. Not `Policy`, which sees observations alone: the clairvoyant sees the costs.
 Choice = Callable[["Situation"], np.ndarray]
 """From what is known before a frame to the action of each drive, int64 [N]."""
@@ -47,6 +49,12 @@ class DriveTable:
     ----------
     cost : float64 [N, T, A]
         Weighted cost (minus reward) of each action while the laser works, at 25 C.
+    reference : float64 [N, T]
+        Cost of 4 DCS in each frame with a laser that heat does not hold back: what returns are
+        relative to.
+    error : float64 [N, T, A]
+        Part of the cost that pays for the depth error.
+    depth_mae_m : float64 [N, T, A]
     laser_cost : float64 [N, A]
         Part of it that pays for the laser's electrical energy.
     surplus : callable
@@ -67,9 +75,14 @@ class DriveTable:
     advance : callable
         The laser's thermal model over one frame: (laser, heat at 25 C) to the next laser; the two
         broadcast. With `tripped`, the heat given is zero.
+    protect : bool
+        Whether fewer shots are granted where those asked for would trip the laser.
     """
 
     cost: np.ndarray
+    reference: np.ndarray
+    error: np.ndarray
+    depth_mae_m: np.ndarray
     laser_cost: np.ndarray
     surplus: Callable[[np.ndarray], np.ndarray]
     tripped_cost: np.ndarray
@@ -79,6 +92,7 @@ class DriveTable:
     span_k: tuple[float, float]
     highest_rise_k: float
     advance: Advance
+    protect: bool
 
     def cost_at(self, frame: int, temperature_k: np.ndarray) -> np.ndarray:
         """Cost of each action at junction temperatures [N, ...]: [N, ..., A].
@@ -97,6 +111,22 @@ class DriveTable:
         heat_j = _for_each_state(self.heat_j, laser.case_k)
         before = ThermalState(*(np.expand_dims(value, -1) for value in laser))
         return self.advance(before, np.where(before.tripped, 0.0, heat_j))
+
+    def barred(self, laser: ThermalState, after: ThermalState) -> np.ndarray:
+        """Actions [N, ..., A] that are not granted: they would trip a laser that protects itself.
+
+        `after` are the lasers' `consequences`. The first action is always granted.
+        """
+        before = np.expand_dims(laser.tripped, -1)
+        return after.tripped & ~before & (np.arange(self.cost.shape[-1]) > 0) & self.protect
+
+    def granted(self, laser: ThermalState, actions: np.ndarray) -> np.ndarray:
+        """Actions [N] that are taken of those asked for: the next lower that is not barred."""
+        barred = self.barred(laser, self.consequences(laser))
+        rows = np.arange(len(actions))
+        for _ in range(barred.shape[-1] - 1):
+            actions = actions - barred[rows, actions]
+        return actions
 
     def start(self) -> ThermalState:
         """The lasers before the first frame."""
@@ -139,13 +169,17 @@ class PlayedTable:
     Attributes
     ----------
     actions : int64 [N, T]
-        Chosen actions, -1 in frames in which the laser was off.
-    cost : float64 [N]
-        Summed cost of each drive.
+        Actions taken, -1 in frames in which the laser was off.
+    frame_cost : float64 [N, T]
     """
 
     actions: np.ndarray
-    cost: np.ndarray
+    frame_cost: np.ndarray
+
+    @property
+    def cost(self) -> np.ndarray:
+        """Summed cost of each drive, [N]."""
+        return self.frame_cost.sum(axis=1)
 
     @property
     def shares(self) -> np.ndarray:
@@ -153,6 +187,12 @@ class PlayedTable:
         chosen = self.actions[self.actions >= 0]
         # Without any such frame all shares are 0, not undefined.
         return np.bincount(chosen, minlength=3) / max(chosen.size, 1)
+
+    @property
+    def energy_share(self) -> float:
+        """Laser energy relative to 8 DCS in every frame with a laser that never trips."""
+        samples = np.array([*Shots, 0])  # The last is that of -1, a laser that is off.
+        return float(samples[self.actions].mean() / Shots.EIGHT)
 
     @property
     def tripped_share(self) -> float:
@@ -163,18 +203,19 @@ class PlayedTable:
 def play(table: DriveTable, choose: Choice) -> PlayedTable:
     """Play every drive of `table`, asking `choose` for the actions [N] of each frame."""
     drives, frames, _ = table.cost.shape
-    laser, snr, cost = table.start(), np.zeros(drives), np.zeros(drives)
-    rows, actions = np.arange(drives), np.empty((drives, frames), np.int64)
+    laser, snr, rows = table.start(), np.zeros(drives), np.arange(drives)
+    actions, frame_cost = np.empty((drives, frames), np.int64), np.empty((drives, frames))
     for frame in range(frames):
         now = Situation(frame, laser, snr, table)
-        chosen = choose(now)
+        taken = table.granted(laser, choose(now))
         # A tripped laser takes no samples: nothing is told, nothing warms, the action is void.
-        actions[:, frame] = np.where(laser.tripped, -1, chosen)
-        cost += np.where(laser.tripped, table.tripped_cost[:, frame], now.cost[rows, chosen])
-        snr = np.where(laser.tripped, snr, table.snr[rows, frame, chosen])
-        heat_j = np.where(laser.tripped, 0.0, table.heat_j[rows, chosen])
+        actions[:, frame] = np.where(laser.tripped, -1, taken)
+        off = table.tripped_cost[:, frame]
+        frame_cost[:, frame] = np.where(laser.tripped, off, now.cost[rows, taken])
+        snr = np.where(laser.tripped, snr, table.snr[rows, frame, taken])
+        heat_j = np.where(laser.tripped, 0.0, table.heat_j[rows, taken])
         laser = table.advance(laser, heat_j)
-    return PlayedTable(actions, cost)
+    return PlayedTable(actions, frame_cost)
 
 
 def _for_each_state(values: np.ndarray, states: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from gymnasium.utils import seeding
 from torch import Tensor
 
@@ -19,7 +20,7 @@ from shotenv.decision import (
     Problem,
     draw_drive,
     outcomes_of_all_actions,
-    reward,
+    weighted,
 )
 from shotenv.env import drive_seed
 from shotenv.laser import case_step, efficiency_at, junction_step, trip_step
@@ -47,24 +48,47 @@ class Possible:
     drives: tuple[Drive, ...]
     outcomes: tuple[Outcomes, ...]
 
-    def table(self, weights: RewardConfig) -> DriveTable:
+    def table(self, weights: RewardConfig, *, price: float | None = None) -> DriveTable:
         """The table that choices are played on, with these reward weights.
 
         Without derating: power that follows the temperature would change what is measured, and
         the outcomes would depend on the actions before.
+
+        Parameters
+        ----------
+        weights : RewardConfig
+        price : float, optional
+            Weight of power in all drives; each drive's own by default.
         """
         period_s, laser = self.problem.frame_period_s, self.problem.config.laser
         ambient_k = np.array([float(drive.ambient_k) for drive in self.drives])
         heat_j = self._stacked(lambda one: one.heat_j[0])
-        cost = self._stacked(lambda one: -reward(one.terms, weights))
-        off = self._stacked(lambda one: -reward(one.tripped_terms, weights))
+        prices = [drive.power_price for drive in self.drives]
+        if price is not None:
+            prices = [torch.full_like(own, price) for own in prices]
+        cost, reference, off = (
+            np.stack(
+                [
+                    weighted(terms(one), own, weights).numpy()
+                    for one, own in zip(self.outcomes, prices, strict=True)
+                ]
+            )
+            for terms in (
+                lambda one: one.terms,
+                lambda one: one.reference,
+                lambda one: one.tripped_terms,
+            )
+        )
         # At 25 C the laser turns `efficiency` of its energy into light and the rest into heat; its
         # price is relative to the energy of always 8 DCS.
         laser_j = heat_j / (1.0 - laser.efficiency)
         whole_j = np.array([float(drive.always_eight.energy_j) for drive in self.drives])
         return DriveTable(
             cost=cost,
-            laser_cost=weights.power * laser_j / whole_j[:, None],
+            reference=reference,
+            error=weights.error * self._stacked(lambda one: one.terms["error"]),
+            depth_mae_m=self._stacked(lambda one: one.score.depth_mae_m),
+            laser_cost=torch.cat(prices).numpy()[:, None] * laser_j / whole_j[:, None],
             surplus=lambda temperature_k: energy_surplus(temperature_k, laser),
             tripped_cost=np.broadcast_to(off.reshape(-1, 1), cost.shape[:2]),
             heat_j=heat_j,
@@ -73,7 +97,14 @@ class Possible:
             span_k=_span_k(ambient_k, heat_j, laser, period_s),
             highest_rise_k=laser.junction_resistance_k_per_w * _hottest_j(heat_j, laser) / period_s,
             advance=thermal_model(ambient_k, laser, period_s),
+            protect=self.problem.config.protect,
         )
+
+    def clips(self) -> np.ndarray:
+        """Number of the bank's clip that each frame is of, int64 [N, T]."""
+        frames = torch.cat([drive.frames[:, :-1] for drive in self.drives]).numpy()
+        starts = np.array([clip.start for clip in self.problem.bank.clips])
+        return np.searchsorted(starts, frames, side="right") - 1
 
     def _stacked(self, of: Callable[[Outcomes], Tensor]) -> np.ndarray:
         return np.stack([of(one).numpy().astype(np.float64) for one in self.outcomes])

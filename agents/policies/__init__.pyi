@@ -3,12 +3,6 @@ from .fixed import (
     FixedPolicy as FixedPolicy,
     RandomPolicy as RandomPolicy,
 )
-from .guard import (
-    GuardedPolicy as GuardedPolicy,
-    ThermalGuard as ThermalGuard,
-    largest_rises_k as largest_rises_k,
-    thermal_guard as thermal_guard,
-)
 from .learned import (
     PpoPolicy as PpoPolicy,
     first_line as first_line,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import ValidationError
 
 from agents.config import AgentConfig
-from agents.policies.guard import ThermalGuard
 from agents.policies.policy import Action, Observation, Policy, single
 from unwrap.signal import Shots
 from unwrap.support import Section, write_bytes, write_json
@@ -20,7 +19,7 @@ from unwrap.support import Section, write_bytes, write_json
 if TYPE_CHECKING:
     from stable_baselines3.common.policies import ActorCriticPolicy
 
-AGENT_SCHEMA: Final = 3
+AGENT_SCHEMA: Final = 4
 WEIGHTS: Final = "policy.safetensors"
 DESCRIPTION: Final = "agent.json"
 
@@ -34,40 +33,32 @@ class Description(Section):
         How the scheduler was trained; its network is built anew from that.
     feature_names : tuple of str
         Elements of the observation, in order.
-    guard_needed_k : (float, float, float)
-        Margin to the laser's trip that each action needs, kelvin.
     versions : dict of str to str
         Of the packages that it was trained with.
     """
 
     agent: AgentConfig
     feature_names: tuple[str, ...]
-    guard_needed_k: tuple[float, float, float]
     versions: dict[str, str]
 
 
 class PpoPolicy(Policy):
-    """A stable-baselines3 actor behind a thermal guard; the most probable action is taken.
+    """A stable-baselines3 actor; the most probable action is taken.
 
     Saved as a folder of `policy.safetensors` and `agent.json`; nothing is ever unpickled.
     """
 
     def __init__(
-        self, network: ActorCriticPolicy, config: AgentConfig, guard: ThermalGuard
+        self, network: ActorCriticPolicy, config: AgentConfig, feature_names: Sequence[str]
     ) -> None:
         self.network = network
         self.config = config
-        self.guard = guard
-
-    @property
-    def feature_names(self) -> tuple[str, ...]:
-        """Names of the observation's elements."""
-        return self.guard.feature_names
+        self.feature_names = tuple(feature_names)
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
-        """The most probable action under the network, if the guard allows it."""
+        """The most probable action under the network."""
         action, _ = self.network.predict(observation, deterministic=True)
-        return single(self.guard(observation, np.asarray(action, dtype=np.int64)))
+        return single(np.asarray(action, dtype=np.int64))
 
     def save(self, folder: Path) -> None:
         """Write `policy.safetensors`, then `agent.json`, each atomically."""
@@ -76,7 +67,6 @@ class PpoPolicy(Policy):
         description = Description(
             agent=self.config,
             feature_names=self.feature_names,
-            guard_needed_k=self.guard.needed_k,
             versions={name: version(name) for name in ("stable-baselines3", "torch")},
         )
         # safetensors refuses tensors that do not lie in one piece.
@@ -99,19 +89,14 @@ class PpoPolicy(Policy):
         """
         from safetensors.torch import load_file
 
-        described = folder / DESCRIPTION
-        description = read_description(described)
-        try:
-            guard = ThermalGuard(description.feature_names, description.guard_needed_k)
-        except ValueError as error:
-            raise ValueError(f"{described}: feature_names: {error}") from None
-        network = build_network(len(guard.feature_names), description.agent)
+        description = read_description(folder / DESCRIPTION)
+        network = build_network(len(description.feature_names), description.agent)
         weights = folder / WEIGHTS
         try:
             network.load_state_dict(load_file(weights))
         except Exception as error:  # safetensors has an error type of its own per fault
             raise ValueError(f"{weights} is not a usable network: {first_line(error)}") from None
-        return cls(network, description.agent, guard)
+        return cls(network, description.agent, description.feature_names)
 
 
 def build_network(features: int, config: AgentConfig) -> ActorCriticPolicy:

@@ -31,7 +31,6 @@ LABELS = {
     "always_2": "Always 2 DCS",
     "always_4": "Always 4 DCS",
     "always_8": "Always 8 DCS",
-    "always_8_guarded": "Always 8 DCS, guarded",
 }
 
 

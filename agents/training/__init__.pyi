@@ -1,3 +1,2 @@
-from .paired import PairedVecEnv as PairedVecEnv
 from .sb3_vector import Sb3VecEnv as Sb3VecEnv
 from .scheduler import train_scheduler as train_scheduler

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -26,7 +26,7 @@ from stable_baselines3.common.utils import set_random_seed
 from tqdm import tqdm
 
 from agents.config import AgentConfig
-from agents.policies import PpoPolicy, ThermalGuard, first_line, network_arguments
+from agents.policies import PpoPolicy, first_line, network_arguments
 from agents.training.sb3_vector import Sb3VecEnv
 from unwrap.support import progress, write_bytes
 
@@ -62,8 +62,8 @@ class Trainer:
     ----------
     envs : Sb3VecEnv
         `config.num_envs` environments.
-    guard : ThermalGuard
-        Stands between network and laser.
+    feature_names : sequence of str
+        Of the observation's elements.
     frames_per_drive : int
         Length of an episode; a round lasts at least that long.
     config : AgentConfig
@@ -84,7 +84,7 @@ class Trainer:
     def __init__(
         self,
         envs: Sb3VecEnv,
-        guard: ThermalGuard,
+        feature_names: Sequence[str],
         frames_per_drive: int,
         config: AgentConfig,
         validate: Validate,
@@ -113,13 +113,12 @@ class Trainer:
             seed=config.seed,
             device="cpu",  # two small layers: copying to a GPU would take longer
         )
-        self.policy = PpoPolicy(self._ppo.policy, config, guard)
+        self.policy = PpoPolicy(self._ppo.policy, config, feature_names)
         # What a checkpoint must have been made with to be continued here.
         self._identity = json.dumps(
             {
                 "agent": config.model_dump(mode="json"),
-                "features": list(guard.feature_names),
-                "guard_needed_k": list(guard.needed_k),
+                "features": list(feature_names),
             }
         )
 

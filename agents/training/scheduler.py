@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Final
 
 from agents.config import DemoConfig
 from agents.evaluation import drive_seeds, make_envs, play_drives
-from agents.policies import PpoPolicy, thermal_guard
-from agents.training.paired import PairedVecEnv
+from agents.policies import PpoPolicy
 from agents.training.ppo import Trainer, training_drives
+from agents.training.sb3_vector import Sb3VecEnv
 from agents.training.warmup import ROLLOUTS, known_frames, warm_start
+from shotenv.decision import FEATURE_NAMES
 from unwrap.support import progress
 
 if TYPE_CHECKING:
@@ -25,7 +26,6 @@ def train_scheduler(config: DemoConfig, out: Path) -> PpoPolicy:
 
     The policy with the best return on validation drives is kept.
     """
-    guard = thermal_guard(config)
     envs = make_envs(config.env, "train", config.agent.num_envs, "SameStep")
     seeds = drive_seeds(config.study, min(VALIDATION_DRIVES, config.study.tuning_drives))
     # Other clips than those of training, and than those of the test that the report tells of.
@@ -40,12 +40,12 @@ def train_scheduler(config: DemoConfig, out: Path) -> PpoPolicy:
         players = make_envs(config.env, "train", len(known), "Disabled")
         frames = (1 + ROLLOUTS) * len(known) * config.env.frames_per_drive
         with progress(frames, "every action in the training drives", "frame") as bar:
-            cases = known_frames(players, known, guard, tick=bar.update)
+            cases = known_frames(players, known, tick=bar.update)
         warm_start(network, cases, seed=config.agent.seed)
 
     return Trainer(
-        PairedVecEnv(envs, guard),
-        guard,
+        Sb3VecEnv(envs),
+        FEATURE_NAMES,
         config.env.frames_per_drive,
         config.agent,
         validate,

@@ -3,7 +3,7 @@
 An action's outcome in a frame depends on the drive, the frame and the action alone, so that it can
 be computed for all of them. The expected cost of a frame under an actor is then a plain sum that is
 made small by gradient descent, without exploring and without noise. What actions do to later frames
-by their heat is not in it; that is left to PPO and the guard.
+by their heat is not in it; that is left to PPO.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from torch import Tensor
 
 from agents.evaluation import play_drives
 from agents.optimum import tabulate
-from agents.policies import Action, GuardedPolicy, Observation, Policy, RandomPolicy, ThermalGuard
+from agents.policies import Action, Observation, Policy, RandomPolicy
 
 if TYPE_CHECKING:
     from stable_baselines3.common.policies import ActorCriticPolicy
@@ -44,7 +44,7 @@ class KnownFrames:
     ----------
     observations : float32 [N, D]
     cost : float32 [N, A]
-        Minus the reward of each action with a working laser.
+        Weighted reward terms of each action with a working laser.
     """
 
     observations: Tensor
@@ -61,11 +61,10 @@ class KnownFrames:
 def known_frames(
     envs: ShotScheduleVectorEnv,
     seeds: Sequence[int],
-    guard: ThermalGuard,
     *,
     tick: Callable[[int], object] = lambda frames: None,
 ) -> KnownFrames:
-    """Frames of the drives `seeds`, as guarded random actions meet them.
+    """Frames of the drives `seeds`, as random actions meet them.
 
     `envs` has as many environments as there are seeds; `tick` is told the number of frames played,
     1 + `ROLLOUTS` times those of the drives in all.
@@ -75,7 +74,7 @@ def known_frames(
     seen = []
     # The same frames are met again with other memories: what was seen last depends on the actions.
     for number in range(ROLLOUTS):
-        recorded = _Recorded(GuardedPolicy(RandomPolicy(number), guard))
+        recorded = _Recorded(RandomPolicy(number))
         play_drives(recorded, envs, seeds, tick=tick)
         seen.append(np.stack(recorded.observations, axis=1))
     observations = np.concatenate(seen)

@@ -2,26 +2,54 @@
 
 from __future__ import annotations
 
-from typing import Literal
+import math
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from shotenv.config.families import Split
 from shotenv.config.laser import LaserConfig
 from shotenv.config.sensor import SensorConfig
-from unwrap.support import NonNegative, Positive, Section
+from unwrap.support import NonNegative, Positive, Range, Section, check_range
+
+
+def _both_ends(price: object) -> object:
+    """A price as the range that holds it alone: 0.04 is (0.04, 0.04)."""
+    return (price, price) if isinstance(price, int | float) else price
 
 
 class RewardConfig(Section):
-    """Weights of the bounded reward terms: r = -(sum of weight times term)."""
+    """Weights of the bounded reward terms.
+
+    The reward is relative to what 4 DCS bring in the same frame, and scaled:
+    `scale` times (weighted terms of 4 DCS minus weighted terms of what was taken).
+    """
 
     error: NonNegative = Field(1.0, description="weight of the depth error term")
-    duty: NonNegative = Field(0.005, description="weight of laser duty relative to always-8")
-    power: NonNegative = Field(0.005, description="weight of power relative to always-8")
+    duty: NonNegative = Field(0.0, description="weight of laser duty relative to always-8")
+    power: Annotated[Range, BeforeValidator(_both_ends)] = Field(
+        (0.04, 0.04),
+        description="weight of power relative to always-8, its price; (low, high) is drawn "
+        "log-uniformly for each drive",
+    )
     trip: NonNegative = Field(0.5, description="weight of a frame without laser")
     error_scale_m: Positive = Field(
         4.0, description="error at which a pixel's term |e| / (|e| + scale) is one half, m"
     )
+    scale: Positive = Field(20.0, description="factor of the reward")
+
+    @model_validator(mode="after")
+    def _price_possible(self) -> RewardConfig:
+        low, high = self.power
+        check_range("power", self.power)
+        if low < 0 or not math.isfinite(high):
+            raise ValueError(f"power is ({low:g}, {high:g}); expected finite weights >= 0")
+        # Log-uniform: a price of 0 lies infinitely far below every other.
+        if low == 0 < high:
+            raise ValueError(
+                f"power is (0, {high:g}); expected a range that begins above 0, or 0 alone"
+            )
+        return self
 
 
 class EnvConfig(Section):
@@ -41,6 +69,11 @@ class EnvConfig(Section):
     merge: Literal["nearest", "floor", "none"] = Field(
         "nearest",
         description="how prediction and wrapped map merge: ours, eq. 6, or the prediction alone",
+    )
+    protect: bool = Field(
+        True,
+        description="whether the sensor grants fewer shots where those asked for would trip the "
+        "laser",
     )
     frames_per_drive: int = Field(256, ge=2, description="frames of one episode")
     frame_rate_hz: Positive = Field(10.0, description="frames per second")

@@ -1,6 +1,7 @@
 from .acquire import (
     Acquisition as Acquisition,
     acquire_depth as acquire_depth,
+    acquire_depths as acquire_depths,
     noise_of as noise_of,
 )
 from .drive import Drive as Drive, DriveOptions as DriveOptions, draw_drive as draw_drive
@@ -17,6 +18,11 @@ from .measurement_cache import MeasurementCache as MeasurementCache
 from .observation import observe as observe
 from .outcomes import Outcomes as Outcomes, outcomes_of_all_actions as outcomes_of_all_actions
 from .problem import Problem as Problem, open_problem as open_problem
-from .rewards import TERMS as TERMS, reward as reward
+from .rewards import TERMS as TERMS, weighted as weighted
 from .state import State as State
-from .transition import Outcome as Outcome, reset as reset, step as step
+from .transition import (
+    Outcome as Outcome,
+    allowed_actions as allowed_actions,
+    reset as reset,
+    step as step,
+)

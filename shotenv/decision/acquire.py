@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -11,7 +11,7 @@ from torch import Tensor
 from shotenv.decision.drive import Drive
 from shotenv.decision.problem import Problem
 from shotenv.sensor import (
-    acquire,
+    acquire_prefixes,
     incident_light,
     noise_samples,
     sample_noise_lsb,
@@ -64,12 +64,35 @@ def acquire_depth(
 ) -> Acquisition:
     """Acquire and correct the frames at `step` [B] of `drive` with `shots` samples each.
 
+    See `acquire_depths`.
+    """
+    return acquire_depths(problem, drive, step, (shots,), power_w, noise=noise)[0]
+
+
+def acquire_depths(
+    problem: Problem,
+    drive: Drive,
+    step: Tensor,
+    counts: Sequence[Shots],
+    power_w: Tensor | None = None,
+    *,
+    noise: Iterable[Tensor] | None = None,
+) -> list[Acquisition]:
+    """One acquisition of the frames at `step` [B] of `drive`, corrected from its first samples.
+
     Parameters
     ----------
+    counts : sequence of Shots
+        From how many samples; the most of them are taken, and the fewer are the first of these.
     power_w : float64 [B], optional
         What the laser emits while on, W; None is the drive's own power, not derated.
     noise : iterable of float32 [B, 2, H, W], optional
         Normals of each sample; None draws the drive's own.
+
+    Returns
+    -------
+    list of Acquisition
+        In the order of `counts`.
     """
     bank, sensor, frames = problem.bank, problem.config.sensor, drive.frame(step)
     exposure, gray = bank.exposure(frames), bank.gray(frames)
@@ -80,26 +103,31 @@ def acquire_depth(
     if power_w is not None and drive.is_derated(power_w):
         light = incident_light(exposure, sensitivity(sensor, power_w, drive.integration_s))
     scored = scored_pixels(undiminished, exposure.distance_m, sensor)
-    raw = acquire(light, sensor, shots=shots, noise=noise, offsets=drive.offsets)
-    # As the sensor itself expects it, from its gray image and, of two samples, its calibration.
-    noise_lsb = sample_noise_lsb(
-        gray,
-        problem.gray_exposure_s.take(frames),
-        drive.integration_s,
-        sensor,
-        offset_left_lsb=drive.offset_left_lsb if shots == Shots.TWO else None,
-    )
-    predicted_m = predict(problem, drive, frames, raw, noise_lsb)
-    depth = correct(
-        raw,
-        predicted_m,
-        problem.description,
-        merge=problem.config.merge,
-        offset_lsb=offset_to_subtract_lsb(drive, shots),
-        noise_lsb=noise_lsb,
-        shift_m=drive.drift_m,
-    )
-    return Acquisition(raw, depth, predicted_m, noise_lsb, exposure.distance_m, scored)
+    taken = acquire_prefixes(light, sensor, shots=max(counts), noise=noise, offsets=drive.offsets)
+    corrected = []
+    for shots in counts:
+        # As the sensor itself expects it, from its gray image and, of two samples, its calibration.
+        noise_lsb = sample_noise_lsb(
+            gray,
+            problem.gray_exposure_s.take(frames),
+            drive.integration_s,
+            sensor,
+            offset_left_lsb=drive.offset_left_lsb if shots == Shots.TWO else None,
+        )
+        predicted_m = predict(problem, drive, frames, taken[shots], noise_lsb)
+        depth = correct(
+            taken[shots],
+            predicted_m,
+            problem.description,
+            merge=problem.config.merge,
+            offset_lsb=offset_to_subtract_lsb(drive, shots),
+            noise_lsb=noise_lsb,
+            shift_m=drive.drift_m,
+        )
+        corrected.append(
+            Acquisition(taken[shots], depth, predicted_m, noise_lsb, exposure.distance_m, scored)
+        )
+    return corrected
 
 
 def offset_to_subtract_lsb(drive: Drive, shots: Shots) -> Tensor | None:

@@ -37,7 +37,7 @@ class DriveOptions:
     ----------
     families : tuple of str, optional
         Only clips of these families.
-    laser_power_w, integration_s, ambient_k : float, optional
+    laser_power_w, integration_s, ambient_k, power_price : float, optional
         As in `Drive`.
     """
 
@@ -45,6 +45,7 @@ class DriveOptions:
     laser_power_w: float | None = None
     integration_s: float | None = None
     ambient_k: float | None = None
+    power_price: float | None = None
 
 
 DRAWN = DriveOptions()
@@ -73,9 +74,11 @@ class Drive:
         Standard deviation of what the stored map of the offsets leaves, as the sensor expects it.
     drift_m : float64 [B]
         What the imager's temperature adds to every distance, compensation included, metres.
-    always_eight : ShotCost
-        Most that a frame of eight samples costs with this laser and integration time: at its full
-        power, about to trip.
+    power_price : float64 [B]
+        Weight of power in the reward.
+    always_four, always_eight : ShotCost
+        Most that a frame of four and of eight samples costs with this laser and integration time:
+        at its full power, about to trip.
     """
 
     seed: Tensor
@@ -88,6 +91,8 @@ class Drive:
     offsets: OffsetPattern
     offset_left_lsb: Tensor
     drift_m: Tensor
+    power_price: Tensor
+    always_four: ShotCost
     always_eight: ShotCost
 
     def frame(self, step: Tensor) -> Tensor:
@@ -111,8 +116,9 @@ def draw_drive(
 ) -> Drive:
     """The drive of `seed`, a batch of one.
 
-    Laser power and integration time are drawn log-uniformly, the ambient temperature uniformly,
-    and the laser starts between ambient and the temperature at which it would be released.
+    Laser power, integration time and the price of power are drawn log-uniformly, the ambient
+    temperature uniformly, and the laser starts between ambient and the temperature at which it
+    would be released.
     `network` is what networks compute in a frame; it counts in `Drive.always_eight`. What
     `options` set replaces what was drawn and shifts nothing else.
     """
@@ -122,9 +128,9 @@ def draw_drive(
         clips = [clip for clip in clips if clip.family in options.families]
     # One frame more than are played: the last step, too, is followed by an observation.
     frames = chain_clips(clips, config.frames_per_drive + 1, generator=layout)
-    # Laser power, integration time, ambient and start temperature, whatever their ranges are: a
-    # range of no width does not shift the others.
-    unit = torch.rand(4, dtype=torch.float64, generator=body)
+    # Laser power, integration time, ambient, start temperature and price, whatever their ranges
+    # are: a range of no width does not shift the others.
+    unit = torch.rand(5, dtype=torch.float64, generator=body)
     laser_power_w = _log_uniform(config.laser.optical_power_w, unit[0:1])
     integration_s = _log_uniform(config.sensor.integration_s, unit[1:2])
     ambient_k = _uniform(config.laser.ambient_k, unit[2:3])
@@ -140,6 +146,19 @@ def draw_drive(
         generator=stream(Purpose.OFFSETS, seed),
         imager_k=float(imager_k),
     )
+    # The most there is: the reward's terms must not leave 0..1 however warm the laser is.
+    always_four, always_eight = (
+        shot_cost(
+            torch.tensor([int(shots)]),
+            config.laser,
+            optical_power_w=laser_power_w,
+            temperature_k=torch.full_like(laser_power_w, config.laser.trip_k),
+            integration_s=integration_s,
+            frame_period_s=1.0 / config.frame_rate_hz,
+            network=network,
+        )
+        for shots in (Shots.FOUR, Shots.EIGHT)
+    )
     return Drive(
         seed=torch.tensor([seed]),
         frames=frames.unsqueeze(0),
@@ -151,16 +170,9 @@ def draw_drive(
         offsets=offsets,
         offset_left_lsb=offset_left_lsb(config.sensor, imager_k),
         drift_m=residual_drift_m(config.sensor, imager_k),
-        # The most there is: the reward's terms must not leave 0..1 however warm the laser is.
-        always_eight=shot_cost(
-            torch.tensor([int(Shots.EIGHT)]),
-            config.laser,
-            optical_power_w=laser_power_w,
-            temperature_k=torch.full_like(laser_power_w, config.laser.trip_k),
-            integration_s=integration_s,
-            frame_period_s=1.0 / config.frame_rate_hz,
-            network=network,
-        ),
+        power_price=_chosen(options.power_price, _log_uniform(config.reward.power, unit[4:5])),
+        always_four=always_four,
+        always_eight=always_eight,
     )
 
 
@@ -197,4 +209,6 @@ def _uniform(bounds: Range, unit: Tensor) -> Tensor:
 
 
 def _log_uniform(bounds: Range, unit: Tensor) -> Tensor:
-    return bounds[0] * (bounds[1] / bounds[0]) ** unit
+    low, high = bounds
+    # A price may be 0, which has no logarithm; its range is then that number alone.
+    return low * (high / low) ** unit if low < high else torch.full_like(unit, low)

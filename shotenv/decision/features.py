@@ -81,8 +81,10 @@ class Sums:
     strength, residual
         Sums of q / (q + 1), q being the amplitude, or the residual of opposite samples, over four
         standard deviations of a sample.
-    disagreement
-        Sum over valid pixels of e / (e + 1 m), e the distance between depth and prediction.
+    lost_by_two, lost_by_four, two_from_four
+        Sums over valid pixels of the reward's error term e / (e + scale), e the distance between
+        the depth of all samples and that of the first two; and of the first four; and between
+        these two.
     """
 
     pixels: Tensor
@@ -91,7 +93,13 @@ class Sums:
     amplitude_lsb: Tensor
     strength: Tensor
     residual: Tensor
-    disagreement: Tensor
+    lost_by_two: Tensor
+    lost_by_four: Tensor
+    two_from_four: Tensor
+
+    def per_valid(self, sums: Tensor) -> Tensor:
+        """Mean over the valid pixels; 0 where there are none."""
+        return sums / self.valid.clamp(min=1.0)
 
 
 @dataclass(frozen=True)
@@ -100,8 +108,8 @@ class Now:
 
     Attributes
     ----------
-    gray_change : float32 [B]
-        Mean change of log10 ambient since the last frame.
+    gray_change, change_since_eight : float32 [B]
+        Mean change of log10 ambient since the last frame, and since the last with 8 samples.
     shots, since_four, since_eight : int64 [B]
         Samples of the last frame; frames since the last with at least 4, and with 8 samples.
     above_release_k, margin_k : float64 [B]
@@ -111,9 +119,14 @@ class Now:
         Over the last second, relative to always 8.
     step : int64 [B]
         Frames played, of `frames` in all.
+    power_price : float64 [B]
+        Weight of power in the reward.
+    laser_power_w, integration_s : float64 [B]
+        Settings of the drive.
     """
 
     gray_change: Tensor
+    change_since_eight: Tensor
     shots: Tensor
     since_four: Tensor
     since_eight: Tensor
@@ -123,6 +136,9 @@ class Now:
     power: Tensor
     step: Tensor
     frames: int
+    power_price: Tensor
+    laser_power_w: Tensor
+    integration_s: Tensor
 
 
 def frame_means(maps: Tensor) -> Tensor:
@@ -194,12 +210,15 @@ SEEN_FEATURES = (
     Feature("valid_share", "1", "share of valid pixels", lambda s: s.valid / s.pixels),
     Feature("saturated_share", "1", "share of saturated pixels", lambda s: s.saturated / s.pixels),
     Feature("residual", "1", "mean of q / (q + 1), q what opposite samples do not cancel, over 4 sigma", lambda s: s.residual / s.pixels, Shots.FOUR),
-    Feature("disagreement", "1", "mean of e / (e + 1 m) over valid pixels, e network against two frequencies", lambda s: s.disagreement / s.valid.clamp(min=1.0), Shots.EIGHT),
+    Feature("two_from_four", "1/4", "mean error term of 2 DCS measured against 4 DCS, over valid pixels", lambda s: 4 * s.per_valid(s.two_from_four), Shots.FOUR),
+    Feature("regret_of_two", "1/4", "mean error term of 2 DCS measured against 8 DCS, over valid pixels", lambda s: 4 * s.per_valid(s.lost_by_two), Shots.EIGHT),
+    Feature("regret_of_four", "1/4", "mean error term of 4 DCS measured against 8 DCS, over valid pixels", lambda s: 4 * s.per_valid(s.lost_by_four), Shots.EIGHT),
 )
 """Functions of the `Sums` of the last acquisition with enough samples; 0 before the first."""
 
 STATE_FEATURES = (
     Feature("gray_change", "log10", "mean change of ambient radiance since the last frame, on a coarse grid", lambda n: n.gray_change),
+    Feature("change_since_eight", "log10", "mean change of ambient radiance since the last frame of 8 samples, on a coarse grid", lambda n: n.change_since_eight),
     Feature("last_two", "1", "1 after a frame of 2 samples", lambda n: n.shots == Shots.TWO),
     Feature("last_four", "1", "1 after a frame of 4 samples", lambda n: n.shots == Shots.FOUR),
     Feature("last_eight", "1", "1 after a frame of 8 samples", lambda n: n.shots == Shots.EIGHT),
@@ -209,6 +228,9 @@ STATE_FEATURES = (
     Feature("heat_margin", "log of K", "log(1 + K to the trip; negative: to the release, while off) / 3, fine near 0", lambda n: heat_margin(n.margin_k)),
     Feature("duty", "always 8", "laser duty over the last second", lambda n: n.duty),
     Feature("power", "always 8", "power over the last second", lambda n: n.power),
+    Feature("power_price", "1", "weight p of power in the reward: p / (p + 0.05)", lambda n: n.power_price / (n.power_price + 0.05)),
+    Feature("laser_power", "log10 of 5 W", "optical power while on", lambda n: (n.laser_power_w / 5.0).log10()),
+    Feature("integration", "log10 of 0.5 ms", "integration time of a sample", lambda n: (n.integration_s / 0.5e-3).log10()),
     Feature("time_left", "1", "1 at the start of the drive, -1 at its end", lambda n: 1.0 - n.step * (2.0 / n.frames)),
 )
 """Functions of `Now`."""
@@ -224,7 +246,7 @@ TOLD = torch.tensor(
     ]
 )
 """Which of the `SEEN_FEATURES` each number of samples tells, bool [9, S]: row 2 is that of two
-samples, which leave out `residual` and `disagreement`, and row 0, of none, is all false."""
+samples, which leave out what takes more, and row 0, of none, is all false."""
 
 
 def evaluated(features: Sequence[Feature], seen: Scene | Sums | Now) -> Tensor:

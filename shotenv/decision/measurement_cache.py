@@ -74,10 +74,12 @@ class MeasurementCache:
 
 def _to_rows(measured: Measurement) -> list[list[float]]:
     columns = [getattr(measured.score, name) for name in SCORES]
+    columns.append(measured.error_of_four)
     return torch.cat((torch.stack(columns, dim=1), measured.features.double()), dim=1).tolist()
 
 
 def _from_rows(rows: list[list[float]]) -> Measurement:
     values = torch.tensor(rows, dtype=torch.float64)
-    score = DepthScore(*values[:, : len(SCORES)].T)
-    return Measurement(score, values[:, len(SCORES) :].to(torch.float32))
+    *scores, error_of_four = values[:, : len(SCORES) + 1].T
+    features = values[:, len(SCORES) + 1 :].to(torch.float32)
+    return Measurement(DepthScore(*scores), error_of_four, features)

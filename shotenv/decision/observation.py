@@ -20,6 +20,7 @@ def observe(problem: Problem, state: State) -> Tensor:
     limit_k = torch.where(laser.tripped, limits.release_k, limits.trip_k)
     now = Now(
         gray_change=problem.scenes.change(before, frame),
+        change_since_eight=problem.scenes.change(seen.eight_at, frame),
         shots=seen.shots,
         since_four=seen.since_four,
         since_eight=seen.since_eight,
@@ -29,6 +30,9 @@ def observe(problem: Problem, state: State) -> Tensor:
         power=seen.power,
         step=state.step,
         frames=problem.config.frames_per_drive,
+        power_price=drive.power_price,
+        laser_power_w=drive.laser_power_w,
+        integration_s=drive.integration_s,
     )
     parts = problem.scenes.features[frame], seen.features, evaluated(STATE_FEATURES, now)
     return torch.cat(parts, dim=1).clamp_(-LIMIT, LIMIT)

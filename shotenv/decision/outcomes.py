@@ -12,9 +12,9 @@ from shotenv.config import ROOM_K
 from shotenv.decision.acquire import noise_of
 from shotenv.decision.drive import Drive
 from shotenv.decision.features import TOLD
-from shotenv.decision.measurement import Measurement, measure_frames
+from shotenv.decision.measurement import Measurement, measure_prefixes
 from shotenv.decision.problem import Problem
-from shotenv.decision.rewards import reward, reward_terms
+from shotenv.decision.rewards import reference_terms, reward, reward_terms
 from shotenv.decision.score import DepthScore, no_depth
 from shotenv.decision.transition import SHOTS_OF_ACTION, cost_of
 from unwrap.signal import Shots
@@ -31,25 +31,29 @@ class Outcomes:
     ----------
     terms : dict of float64 [T, 3]
         Unweighted reward terms; "tripped" is 0.
+    reference : dict of float64 [T]
+        Terms of 4 DCS that the reward is relative to.
     reward : float64 [T, 3]
-    heat_j : float64 [T, 3]
+    heat_j, laser_energy_j : float64 [T, 3]
     score : DepthScore
         Fields [T, 3].
     features : float32 [T, 3, len(SEEN_FEATURES)]
         What the sensor would tell; 0 where the shots cannot.
     tripped_terms : dict of float64 [1]
         Terms of a frame without laser, the same in every frame.
-    tripped_reward : float
+    tripped_reward : float64 [T]
         Reward of a frame without laser.
     """
 
     terms: dict[str, Tensor]
+    reference: dict[str, Tensor]
     reward: Tensor
     heat_j: Tensor
+    laser_energy_j: Tensor
     score: DepthScore
     features: Tensor
     tripped_terms: dict[str, Tensor]
-    tripped_reward: float
+    tripped_reward: Tensor
 
 
 @torch.inference_mode()
@@ -72,14 +76,19 @@ def outcomes_of_all_actions(problem: Problem, drive: Drive) -> Outcomes:
     off = cost_of(problem, drive, torch.zeros(1, dtype=torch.int64), room_k)
     lost = no_depth(1, problem.config.sensor.max_range_m)
     tripped_terms = reward_terms(lost, off, drive.always_eight, torch.ones(1, dtype=torch.bool))
+    # One number in each frame, the same whatever the action.
+    reference = reference_terms(measured.error_of_four[:, 0], drive)
+    beside_each = {name: term.unsqueeze(-1) for name, term in reference.items()}
     return Outcomes(
         terms=terms,
-        reward=reward(terms, weights),
+        reference=reference,
+        reward=reward(terms, beside_each, drive.power_price, weights),
         heat_j=cost.heat_j.expand(frames, ACTIONS),
+        laser_energy_j=cost.laser_energy_j.expand(frames, ACTIONS),
         score=measured.score,
         features=torch.where(TOLD[SHOTS_OF_ACTION], measured.features, 0.0),
         tripped_terms=tripped_terms,
-        tripped_reward=float(reward(tripped_terms, weights)),
+        tripped_reward=reward(tripped_terms, reference, drive.power_price, weights),
     )
 
 
@@ -90,4 +99,4 @@ def _measure_all(problem: Problem, drive: Drive, step: Tensor) -> Measurement:
     """
     normals = noise_of(drive, step, problem.bank.height, problem.bank.width)
     noise = list(islice(normals, Shots.EIGHT))
-    return concatenate([measure_frames(problem, drive, step, n, noise=noise) for n in Shots])
+    return concatenate(measure_prefixes(problem, drive, step, noise=noise))

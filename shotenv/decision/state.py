@@ -30,6 +30,8 @@ class Seen:
         Of the last frame; 0 without laser, or before the first frame.
     since_four, since_eight : int64 [B]
         Frames since the last one with at least 4, and with 8 samples.
+    eight_at : int64 [B]
+        Bank frame of the last one with 8 samples; before the first that of the drive's start.
     duty, power : float64 [B]
         Exponential averages of the reward's terms over `RECENT_S`, relative to always 8.
     """
@@ -38,21 +40,31 @@ class Seen:
     shots: Tensor
     since_four: Tensor
     since_eight: Tensor
+    eight_at: Tensor
     duty: Tensor
     power: Tensor
 
     @classmethod
-    def nothing(cls, batch: int) -> Seen:
-        """What is known before the first frame of `batch` drives."""
+    def nothing(cls, first: Tensor) -> Seen:
+        """What is known before the first frames, bank frames `first` [B], of drives."""
         # Zeros, as after a frame without laser: neither has told anything.
-        none, zero = torch.zeros(batch, dtype=torch.int64), torch.zeros(batch, dtype=torch.float64)
-        never = torch.full((batch,), NEVER)
-        return cls(torch.zeros(batch, len(SEEN_FEATURES)), none, never, never, zero, zero)
+        none, zero = torch.zeros_like(first), torch.zeros_like(first, dtype=torch.float64)
+        never, features = torch.full_like(first, NEVER), torch.zeros(len(first), len(SEEN_FEATURES))
+        return cls(features, none, never, never, first, zero, zero)
 
     def after(
-        self, shots: Tensor, features: Tensor, duty: Tensor, power: Tensor, period_s: float
+        self,
+        frame: Tensor,
+        shots: Tensor,
+        features: Tensor,
+        duty: Tensor,
+        power: Tensor,
+        period_s: float,
     ) -> Seen:
-        """What is known one frame of `period_s` later, after `shots` [B] with their features."""
+        """What is known one frame of `period_s` later.
+
+        After `shots` [B] with their features in the bank frames `frame` [B].
+        """
         # Weight of this frame in the averages; a frame longer than the time constant is all of it.
         share = min(1.0, period_s / RECENT_S)
         return Seen(
@@ -60,6 +72,7 @@ class Seen:
             shots=shots,
             since_four=(self.since_four + 1).masked_fill_(shots >= Shots.FOUR, 0),
             since_eight=(self.since_eight + 1).masked_fill_(shots >= Shots.EIGHT, 0),
+            eight_at=torch.where(shots >= Shots.EIGHT, frame, self.eight_at),
             duty=self.duty.lerp(duty, share),
             power=self.power.lerp(power, share),
         )

@@ -17,10 +17,17 @@ from torch import Tensor
 from shotenv.decision.drive import DRAWN, Drive, DriveOptions, draw_drive
 from shotenv.decision.measurement import Measure, measure_by_shots, measure_frames
 from shotenv.decision.problem import Problem
-from shotenv.decision.rewards import reward, reward_terms
+from shotenv.decision.rewards import reference_terms, reward, reward_terms
 from shotenv.decision.score import DepthScore
 from shotenv.decision.state import Seen, State
-from shotenv.laser import ShotCost, emitted_power_w, laser_step, shot_cost, start_laser
+from shotenv.laser import (
+    LaserState,
+    ShotCost,
+    emitted_power_w,
+    laser_step,
+    shot_cost,
+    start_laser,
+)
 from unwrap.signal import Shots
 from unwrap.support import concatenate
 
@@ -37,8 +44,8 @@ class Outcome:
     reward : float64 [B]
     terms : dict of float64 [B]
         Unweighted reward terms.
-    shots : int64 [B]
-        Samples taken; 0 without laser.
+    asked, shots : int64 [B]
+        Samples asked for, and taken: fewer where the sensor protects itself, 0 without laser.
     score : DepthScore
     cost : ShotCost
     tripped : bool [B]
@@ -49,6 +56,7 @@ class Outcome:
 
     reward: Tensor
     terms: dict[str, Tensor]
+    asked: Tensor
     shots: Tensor
     score: DepthScore
     cost: ShotCost
@@ -78,7 +86,8 @@ def reset(problem: Problem, seeds: Sequence[int], options: DriveOptions = DRAWN)
         ]
     )
     played = torch.zeros(len(seeds), dtype=torch.int64)
-    return State(drive, played, start_laser(drive.start_k), Seen.nothing(len(seeds)))
+    seen = Seen.nothing(drive.frame(played))
+    return State(drive, played, start_laser(drive.start_k), seen)
 
 
 @torch.inference_mode()
@@ -90,7 +99,8 @@ def step(
     Parameters
     ----------
     actions : int64 [B]
-        0 = 2 DCS, 1 = 4 DCS, 2 = 8 DCS; a laser that is off takes none.
+        0 = 2 DCS, 1 = 4 DCS, 2 = 8 DCS; a sensor that protects itself may take fewer, see
+        `granted`, and a laser that is off takes none.
     measure : callable
         `measure_frames`, or a `MeasurementCache`, which gives the same.
     """
@@ -98,7 +108,8 @@ def step(
     drive, laser = state.drive, state.laser
 
     # What is asked for, what the laser can give, and what the frame then brings and costs.
-    shots = SHOTS_OF_ACTION.take(actions).masked_fill(laser.tripped, 0)
+    asked = SHOTS_OF_ACTION.take(actions)
+    shots = granted(problem, drive, laser, asked).masked_fill(laser.tripped, 0)
     power_w = emitted_power_w(drive.laser_power_w, laser.temperature_k, config.laser)
     measured = measure_by_shots(problem, state, shots, power_w, measure)
     cost = cost_of(problem, drive, shots, laser.temperature_k)
@@ -107,17 +118,61 @@ def step(
     # All that the next frame will know of this one: its heat, and what was seen.
     # Heat of this frame acts from the next one on; within it the laser is as warm as at its start.
     warmed = laser_step(laser, cost, drive.ambient_k, config.laser, period_s)
-    seen = state.seen.after(shots, measured.features, terms["duty"], terms["power"], period_s)
+    seen = state.seen.after(
+        drive.frame(state.step), shots, measured.features, terms["duty"], terms["power"], period_s
+    )
     following = State(drive, state.step + 1, warmed, seen)
+    reference = reference_terms(measured.error_of_four, drive)
     return following, Outcome(
-        reward=reward(terms, config.reward),
+        reward=reward(terms, reference, drive.power_price, config.reward),
         terms=terms,
+        asked=asked,
         shots=shots,
         score=measured.score,
         cost=cost,
         tripped=laser.tripped,
         truncated=following.step >= config.frames_per_drive,
     )
+
+
+def granted(problem: Problem, drive: Drive, laser: LaserState, asked: Tensor) -> Tensor:
+    """Samples [B] that the sensor takes of those asked for, int64 [B].
+
+    A sensor that protects itself takes the next lower number where those asked for would bring
+    the laser to its trip in this frame; two are always taken.
+    """
+    if not problem.config.protect:
+        return asked
+    shots = asked
+    # From 8 to 4, and to 2. Most frames are far from the trip, and one look is enough for all.
+    for _ in range(len(Shots) - 1):
+        too_hot = would_trip(problem, drive, laser, shots) & (shots > Shots.TWO)
+        if not too_hot.any():
+            break
+        shots = torch.where(too_hot, shots // 2, shots)
+    return shots
+
+
+def allowed_actions(problem: Problem, state: State) -> Tensor:
+    """Which actions a sensor that protects itself would take as they are, bool [B, 3].
+
+    All of them while the laser is off, for none is taken then.
+    """
+    return torch.stack(
+        [
+            ~would_trip(problem, state.drive, state.laser, torch.full_like(state.step, n))
+            | (n == Shots.TWO)
+            for n in SHOTS_OF_ACTION.tolist()
+        ],
+        dim=1,
+    )
+
+
+def would_trip(problem: Problem, drive: Drive, laser: LaserState, shots: Tensor) -> Tensor:
+    """Where taking `shots` [B] would trip a laser that works, bool [B]."""
+    cost = cost_of(problem, drive, shots, laser.temperature_k)
+    after = laser_step(laser, cost, drive.ambient_k, problem.config.laser, problem.frame_period_s)
+    return after.tripped & ~laser.tripped
 
 
 def cost_of(problem: Problem, drive: Drive, shots: Tensor, temperature_k: Tensor) -> ShotCost:

@@ -16,6 +16,9 @@ STRONGEST_W = 100.0
 COLDEST_K = 233.15
 """Ambient temperature that can be set: -40 C, the lower end of the grades of automotive parts."""
 
+HIGHEST_PRICE = 10.0
+"""Price that can be set: always-8's power would weigh ten times as much as having no depth."""
+
 
 @dataclass(frozen=True)
 class ResetOptions:
@@ -76,12 +79,20 @@ def check_number(name: str, value: Any, above: float, below: float, unit: str) -
     return float(value)
 
 
+def check_power_price(value: Any, problem: Problem) -> float:
+    """Weight of power in the reward; 0 makes it free."""
+    if value == 0 and not isinstance(value, bool):
+        return 0.0
+    return check_number("power_price", value, 0.0, HIGHEST_PRICE, "error terms")
+
+
 # Fields of `DriveOptions`, each with what checks it: a new option is a line here and a field there.
 CHECKS: Mapping[str, Callable[[Any, Problem], Any]] = {
     "families": check_families,
     "laser_power_w": check_laser_power,
     "integration_s": check_integration,
     "ambient_k": check_ambient,
+    "power_price": check_power_price,
 }
 KNOWN = ("drive", *CHECKS)
 

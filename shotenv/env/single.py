@@ -17,6 +17,7 @@ from shotenv.decision import (
     MeasurementCache,
     Outcome,
     State,
+    allowed_actions,
     measure_frames,
     observe,
     open_problem,
@@ -199,6 +200,12 @@ class ShotScheduleEnv(gymnasium.Env[Any, np.int64]):
         if self._trace is None:
             raise gymnasium.error.ResetNeeded("no drive is under way; call reset() first")
         return paint_drive(self.problem, self._trace) if self.render_mode == "rgb_array" else None
+
+    def action_masks(self) -> np.ndarray:
+        """Which actions the laser's heat allows now, bool [3]: others would trip it."""
+        if self.state is None:
+            raise gymnasium.error.ResetNeeded("no drive is under way; call reset() first")
+        return allowed_actions(self.problem, self.state)[0].numpy()
 
     def close(self) -> None:
         """Close the window, if there is one."""

@@ -21,6 +21,7 @@ from shotenv.decision import (
     MeasurementCache,
     Outcome,
     State,
+    allowed_actions,
     measure_frames,
     observe,
     open_problem,
@@ -58,7 +59,6 @@ from shotenv.env.info import (
 from shotenv.env.picture import Trace, paint_drive
 from shotenv.env.reset_options import ResetOptions, check_options
 from shotenv.env.single import objectives_of
-from unwrap.signal import Shots
 from unwrap.support import put, take
 
 RENDER_MODES = ("rgb_array",)
@@ -201,13 +201,9 @@ class ShotScheduleVectorEnv(VectorEnv):
         infos = vector_info(columns, rows, self.num_envs) | final
         return self._observations(), rewards, none, truncated, infos
 
-    def error_of(self, shots: Shots) -> np.ndarray:
-        """Error term [N] that `shots` would bring in the current frames; nothing is played.
-
-        It does not depend on what is played, so it can serve as a control variate in training.
-        """
-        state = self._under_way()
-        return self._measure(self.problem, state.drive, state.step, shots).score.error.numpy()
+    def action_masks(self) -> np.ndarray:
+        """Which actions the heat of each drive's laser allows now, bool [N, 3]."""
+        return allowed_actions(self.problem, self._under_way()).numpy()
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Pictures of the last frames; None without a render mode."""

@@ -14,8 +14,8 @@ from shotenv.laser.cost import ShotCost
 
 Array = Any
 SECONDS_PER_HOUR = 3600.0
-MOST_SHOTS = 8
-"""Samples of the longest acquisition, `unwrap.signal.Shots.EIGHT`."""
+PREFIXES = (2, 4, 8)
+"""Samples of the acquisitions, `unwrap.signal.Shots`: each holds the shorter ones."""
 
 
 class NetworkWork(NamedTuple):
@@ -26,7 +26,8 @@ class NetworkWork(NamedTuple):
     gray : float
         Of the prediction from the gray image: in every frame, for the observation tells it.
     samples : float
-        Of a network that looks at the samples: wherever some were taken.
+        Of a network that looks at the samples: once for the samples taken, and once for each
+        shorter acquisition in them, for what fewer samples would have brought is observed too.
     """
 
     gray: float = 0.0
@@ -71,10 +72,11 @@ def chip_energies_j(
     because a step looks up its row faster than it could work it out.
     """
     rows = []
-    for shots in range(MOST_SHOTS + 1):
+    for shots in range(PREFIXES[-1] + 1):
         # One readout more, of the gray image.
         readouts_j = (shots + 1) * readout_j
-        networks_j = gray_network_j + (samples_network_j if shots else 0.0)
+        passes = sum(fewer <= shots for fewer in PREFIXES)
+        networks_j = gray_network_j + samples_network_j * passes
         rows.append((readouts_j, static_j, networks_j, readouts_j + static_j + networks_j))
     return torch.tensor(rows, dtype=torch.float64).T.contiguous()
 

@@ -62,6 +62,9 @@ def expose(
     return acquire(light, sensor, shots=shots, noise=samples, offsets=offsets)
 
 
+ACQUISITIONS = frozenset(int(shots) for shots in Shots)
+
+
 @dataclass(frozen=True)
 class Sensitivity:
     """Electrons of one sample per unit of light, at a laser power and integration time.
@@ -99,6 +102,21 @@ def acquire(
     Sample after sample, so that what one sample needs stays in the processor's cache; `noise`
     gives the normals [B, 2, H, W] of each.
     """
+    return acquire_prefixes(light, sensor, shots=shots, noise=noise, offsets=offsets)[shots]
+
+
+def acquire_prefixes(
+    light: IncidentLight,
+    sensor: SensorConfig,
+    *,
+    shots: Shots,
+    noise: Iterable[Tensor] | None,
+    offsets: OffsetPattern | None,
+) -> dict[Shots, RawFrame]:
+    """As `acquire`, with the shorter acquisitions that are in this one.
+
+    A frame of eight samples is also one of its first two and one of its first four.
+    """
     shape = batch, height, width = light.active.shape
     pixel = pixel_of(sensor)
     if offsets is None:
@@ -113,9 +131,14 @@ def acquire(
     # A compiled loop does not broadcast, and reads on where an array ends: shapes are made equal
     # here, where a wrong one is still an error.
     made = array(offsets.pattern_lsb.expand(shape)), pixel, dcs_lsb, saturated
+    taken: dict[Shots, RawFrame] = {}
     for number, normals in zip(range(shots), noise, strict=False):
         take_sample_(number, light, array(normals), *made)
-    return RawFrame(torch.from_numpy(dcs_lsb), torch.from_numpy(saturated))
+        if number + 1 in ACQUISITIONS:
+            # A copy: the samples to come go on marking pixels.
+            samples = torch.from_numpy(dcs_lsb[:, : number + 1])
+            taken[Shots(number + 1)] = RawFrame(samples, torch.from_numpy(saturated.copy()))
+    return taken
 
 
 def scored_pixels(light: IncidentLight, truth_m: Tensor, sensor: SensorConfig) -> Tensor:

@@ -81,7 +81,9 @@ def episode(env, seed):
     return np.array(observations)
 
 
-def test_no_element_is_constant_over_two_episodes(env):
+@pytest.mark.parametrize("name", IDS)
+def test_no_element_is_constant_over_two_episodes(name, tiny_kwargs):
+    env = gymnasium.make(name, reward={"power": [0.01, 0.1]}, **tiny_kwargs)
     seen = np.concatenate([episode(env, 1), episode(env, 2)])
     constant = [
         n for n, v in zip(env.unwrapped.feature_names, seen.T, strict=True) if np.ptp(v) == 0

@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from agents.policies.guard import ThermalGuard
 
 from agents.config.demo import DemoConfig
 from agents.config.study_config import StudyConfig
@@ -21,7 +22,6 @@ from agents.optimum.dynamic import clairvoyant
 from agents.optimum.outcome_table import play
 from agents.optimum.tabulation import tabulate
 from agents.policies.fixed import FixedPolicy, RandomPolicy
-from agents.policies.guard import ThermalGuard
 from agents.policies.learned import PpoPolicy
 from agents.policies.rules import SnrThresholdPolicy
 from agents.report.evaluation_files import write_evaluation

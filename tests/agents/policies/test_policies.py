@@ -3,10 +3,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from agents.policies.guard import ThermalGuard
 
 from agents.config.agent import AgentConfig
 from agents.policies.fixed import CyclePolicy, FixedPolicy, RandomPolicy
-from agents.policies.guard import ThermalGuard
 from agents.policies.learned import PpoPolicy, build_network
 from agents.policies.rules import SnrThresholdPolicy
 

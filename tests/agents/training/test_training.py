@@ -6,12 +6,12 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
+from agents.policies.guard import ThermalGuard
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from safetensors.torch import load_file
 
 import agents
 from agents.config.agent import AgentConfig
-from agents.policies.guard import ThermalGuard
 from agents.policies.learned import PpoPolicy
 from agents.training.ppo import CHECKPOINT, Trainer
 from agents.training.sb3_vector import Sb3VecEnv, split_infos

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import torch
+from agents.policies.guard import ThermalGuard
 from test_training import CONFIG, FRAMES, OPEN, make_envs, validate
 
 from agents.evaluation.play import make_envs as make_shotenv, play_drives
 from agents.policies.fixed import FixedPolicy
-from agents.policies.guard import ThermalGuard
 from agents.policies.learned import PpoPolicy, build_network
 from agents.training.ppo import Trainer
 from agents.training.sb3_vector import Sb3VecEnv

@@ -39,18 +39,21 @@ def make_vec(kwargs, num_envs=3, **changes):
 
 
 def test_a_step_tells_what_it_cost(tiny_kwargs):
-    env = make(tiny_kwargs, reward={"power": 0.2})
+    env = make(tiny_kwargs, reward={"power": 0.2, "scale": 5.0}, outcomes=True)
     env.reset(seed=0)
+    weights = env.unwrapped.problem.config.reward
+    weighed = np.array([weights.error, weights.duty, 0.2, weights.trip])
     for action, shots in ((0, 2), (1, 4), (2, 8)):
         _, reward, _, _, info = env.step(action)
         assert set(info) >= TOLD
-        assert info["shots"] == shots
-        weights = env.unwrapped.problem.config.reward
-        expected = [weights.error, weights.duty, 0.2, weights.trip]
-        terms = info["reward_terms"]
-        assert reward == pytest.approx(-np.dot(expected, [terms[name] for name in TERMS]))
+        assert info["shots"] == info["asked"] == shots
+        terms = [info["reward_terms"][name] for name in TERMS]
         assert info["vector_reward"] in env.unwrapped.reward_space
-        assert np.allclose(info["vector_reward"], [terms[name] for name in TERMS])
+        assert np.allclose(info["vector_reward"], terms)
+        # What the choice is worth is what its terms weigh less than another's in the same frame.
+        outcomes = info["outcomes"]
+        saved = weighed @ outcomes["vector_reward"][1] - weighed @ terms
+        assert reward - outcomes["reward"][1] == pytest.approx(5.0 * saved, abs=1e-5)
 
 
 def test_a_film_plays_in_real_time(tiny_kwargs, tiny_bank, tmp_path):
@@ -95,7 +98,7 @@ def test_wrong_actions_of_a_vector_are_named(tiny_kwargs, actions):
     ("changes", "named"),
     [
         ({"colour": 1}, "colour"),
-        ({"reward": {"power": -1}}, "reward.power"),
+        ({"reward": {"power": -1}}, "reward: power is"),
         (
             {"reward": {"speed": 1}},
             r"unknown key reward\.speed; expected one of error, duty",
