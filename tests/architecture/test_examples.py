@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import importlib.util
+import json
 import math
 import re
 import sys
@@ -84,6 +85,18 @@ def test_stable_baselines3_learns_through_the_adapter(tiny_kwargs, algorithm):
     environment = {**tiny_kwargs, "frames_per_drive": 8}
     mean = example("stable_baselines").main(algorithm, 64, 2, 2, environment)
     assert math.isfinite(mean)
+
+
+def test_the_notebook_runs_from_top_to_bottom(monkeypatch, tiny_kwargs, capsys):
+    make, small = gymnasium.make, {**tiny_kwargs, "frames_per_drive": 6}
+    monkeypatch.setattr(gymnasium, "make", lambda name, **chosen: make(name, **small, **chosen))
+    cells = json.loads((ROOT / "examples" / "tour.ipynb").read_text("utf-8"))["cells"]
+    names: dict[str, object] = {}
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            assert cell["outputs"] == [], "committed without outputs"
+            exec("".join(cell["source"]), names)
+    assert "always 8: return" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", WITH_EXAMPLES)
