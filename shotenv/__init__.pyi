@@ -7,3 +7,5 @@ from .env import (
 from .sensor import expose as expose
 
 ENV_ID: str
+IMAGE_ENV_ID: str
+MO_ENV_ID: str

@@ -15,7 +15,9 @@ from jsonargparse import ArgumentError, Namespace
 
 from agents.cli import (
     bank_commands,
+    collect_command,
     doctor_command,
+    play_command,
     problem_command,
     schedule_commands,
     unwrap_commands,
@@ -28,6 +30,8 @@ COMMANDS: tuple[Command, ...] = (
     *doctor_command.COMMANDS,
     *schedule_commands.COMMANDS,
     *problem_command.COMMANDS,
+    *play_command.COMMANDS,
+    *collect_command.COMMANDS,
     *bank_commands.COMMANDS,
     *unwrap_commands.COMMANDS,
 )

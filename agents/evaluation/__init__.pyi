@@ -1,6 +1,13 @@
 from .acceptance import judged as judged, print_problem as print_problem
+from .episodes import (
+    play_episodes as play_episodes,
+    require_minari as require_minari,
+    write_dataset as write_dataset,
+)
 from .headroom import check_solvable as check_solvable, measure_problem as measure_problem
+from .match import Match as Match, Tally as Tally
 from .play import (
+    FIXED_POLICIES as FIXED_POLICIES,
     PlayedDrives as PlayedDrives,
     drive_seeds as drive_seeds,
     make_envs as make_envs,

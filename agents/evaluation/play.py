@@ -100,6 +100,8 @@ def play_drives(
     one_each: Any = list(seeds)  # gymnasium's annotation forgets sequences
     observations, infos = envs.reset(seed=one_each)
     policy.reset()
+    unwrapped: Any = envs.unwrapped  # gymnasium's annotation does not know our attributes
+    families = np.array(unwrapped.family_names)
     # All drives are equally long: they end in the same step, and no frame of a next one is kept.
     frames: list[dict[str, np.ndarray]] = []
     done = np.zeros(len(seeds), dtype=bool)
@@ -120,7 +122,7 @@ def play_drives(
                 "depth_mae_m": np.where(off, np.nan, told["depth_mae_m"]),
                 "wrap_accuracy": np.where(off, np.nan, told["wrap_accuracy"]),
                 "temperature_k": np.array(told["temperature_k"]),
-                "family": np.array(told["family"], dtype=np.str_),
+                "family": families[told["family"]],
             }
         )
         tick(len(seeds))

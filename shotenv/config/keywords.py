@@ -39,7 +39,7 @@ def env_config(config: str = "default", **fields: Any) -> EnvConfig:
 
     Examples
     --------
-    >>> env_config(reward={"power": 0.2}).reward.power
+    >>> env_config(reward={"duty": 0.2}).reward.duty
     0.2
     """
     # A named file replaces the whole section, a mapping changes single values of the base's.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,6 +18,8 @@ from unwrap.support import Section
 limit_yaml()
 
 Model = TypeVar("Model", bound=Section)
+UNKNOWN_KEY = re.compile(r"does not accept option '([\w.]+)'")
+"""What jsonargparse says of a key that a file has and its section has not."""
 
 
 class ConfigError(ValueError):
@@ -64,24 +67,39 @@ def read_config(model: type[Model], path: Path, overrides: Sequence[str] = ()) -
             raise ValueError(f"{size} bytes; expected at most {LONGEST_TEXT} characters")
         return parser.instantiate(parser.parse_args(["--config", str(path), *words])).config
     except (jsonargparse.ArgumentError, ValueError, TypeError, OSError) as error:
-        raise ConfigError(f"{path.name}: {one_sentence(error)}") from None
+        sentence = one_sentence(error)
+        if (unknown := UNKNOWN_KEY.search(sentence)) is not None:
+            sentence = _unknown(unknown[1].split("."), model)
+        raise ConfigError(f"{path.name}: {sentence}") from None
 
 
-def one_sentence(error: Exception) -> str:
-    """What a validation error says, on one line, without the library's own advertising."""
+def one_sentence(error: Exception, model: type[Section] | None = None) -> str:
+    """What a validation error says, on one line, without the library's own advertising.
+
+    Of an unknown key it tells the known ones, where `model`, the section read, is given.
+    """
     if isinstance(error, ValidationError):
-        return "; ".join(_complaint(detail) for detail in error.errors())
+        return "; ".join(_complaint(detail, model) for detail in error.errors())
     kept = [line.strip() for line in str(error).splitlines() if "errors.pydantic.dev" not in line]
     return " ".join(" ".join(kept).replace("config.", "").split())
 
 
-def _complaint(detail: Any) -> str:
+def _complaint(detail: Any, model: type[Section] | None) -> str:
     """One of the errors that pydantic found, as `field: what was expected, got value`."""
     where = ".".join(str(part) for part in detail["loc"]) or "configuration"
     message = detail["msg"].removeprefix("Value error, ")
     if detail["type"] == "extra_forbidden":
-        return f"unknown key {where}"
+        return _unknown(detail["loc"], model)
     return f"{where}: {message}, got {detail['input']!r}" if detail["loc"] else message
+
+
+def _unknown(place: Sequence[Any], model: Any) -> str:
+    """Refusal of the key at `place`, such as ("reward", "energy"), of the section `model`."""
+    for key in place[:-1]:
+        model = model.model_fields[key].annotation if hasattr(model, "model_fields") else None
+    known = ", ".join(getattr(model, "model_fields", ()))
+    sentence = f"unknown key {'.'.join(map(str, place))}"
+    return f"{sentence}; expected one of {known}" if known else sentence
 
 
 def merged(base: Model, changes: Mapping[str, Any]) -> Model:
@@ -95,7 +113,7 @@ def merged(base: Model, changes: Mapping[str, Any]) -> Model:
     try:
         return type(base).model_validate(_overlay(base.model_dump(), changes))
     except ValidationError as error:
-        raise ConfigError(one_sentence(error)) from None
+        raise ConfigError(one_sentence(error, type(base))) from None
 
 
 def _overlay(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from .acquire import (
     acquire_depths as acquire_depths,
     noise_of as noise_of,
 )
-from .drive import Drive as Drive, draw_drive as draw_drive
+from .drive import Drive as Drive, DriveOptions as DriveOptions, draw_drive as draw_drive
 from .features import (
     FEATURE_NAMES as FEATURE_NAMES,
     FEATURES as FEATURES,
@@ -13,7 +13,7 @@ from .features import (
     feature_index as feature_index,
     heat_margin_k as heat_margin_k,
 )
-from .measurement import measure_frames as measure_frames
+from .measurement import Measure as Measure, measure_frames as measure_frames
 from .measurement_cache import MeasurementCache as MeasurementCache
 from .observation import observe as observe
 from .outcomes import Outcomes as Outcomes, outcomes_of_all_actions as outcomes_of_all_actions

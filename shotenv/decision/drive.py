@@ -30,6 +30,29 @@ FAMILY_STAYS = 0.5
 
 
 @dataclass(frozen=True)
+class DriveOptions:
+    """What is set of a drive instead of drawn; None leaves it to chance.
+
+    Attributes
+    ----------
+    families : tuple of str, optional
+        Only clips of these families.
+    laser_power_w, integration_s, ambient_k, power_price : float, optional
+        As in `Drive`.
+    """
+
+    families: tuple[str, ...] | None = None
+    laser_power_w: float | None = None
+    integration_s: float | None = None
+    ambient_k: float | None = None
+    power_price: float | None = None
+
+
+DRAWN = DriveOptions()
+"""Nothing is set."""
+
+
+@dataclass(frozen=True)
 class Drive:
     """A batch of drives: everything about an episode that no action changes.
 
@@ -89,16 +112,20 @@ def draw_drive(
     width: int,
     *,
     network: NetworkWork = NO_NETWORK,
+    options: DriveOptions = DRAWN,
 ) -> Drive:
     """The drive of `seed`, a batch of one.
 
     Laser power, integration time and the price of power are drawn log-uniformly, the ambient
     temperature uniformly, and the laser starts between ambient and the temperature at which it
     would be released.
-    `network` is what networks compute in a frame; it counts in `Drive.always_eight`.
+    `network` is what networks compute in a frame; it counts in `Drive.always_eight`. What
+    `options` set replaces what was drawn and shifts nothing else.
     """
     # A stream for each purpose: a longer layout does not change the laser that is drawn.
     layout, body = stream(Purpose.DRIVE, seed, 0), stream(Purpose.DRIVE, seed, 1)
+    if options.families is not None:
+        clips = [clip for clip in clips if clip.family in options.families]
     # One frame more than are played: the last step, too, is followed by an observation.
     frames = chain_clips(clips, config.frames_per_drive + 1, generator=layout)
     # Laser power, integration time, ambient, start temperature and price, whatever their ranges
@@ -107,6 +134,10 @@ def draw_drive(
     laser_power_w = _log_uniform(config.laser.optical_power_w, unit[0:1])
     integration_s = _log_uniform(config.sensor.integration_s, unit[1:2])
     ambient_k = _uniform(config.laser.ambient_k, unit[2:3])
+    # All are drawn in any case, so that one that is set does not shift the others.
+    laser_power_w = _chosen(options.laser_power_w, laser_power_w)
+    integration_s = _chosen(options.integration_s, integration_s)
+    ambient_k = _chosen(options.ambient_k, ambient_k)
     imager_k = imager_temperature_k(config.sensor, ambient_k)
     offsets = draw_offsets(
         config.sensor,
@@ -139,7 +170,7 @@ def draw_drive(
         offsets=offsets,
         offset_left_lsb=offset_left_lsb(config.sensor, imager_k),
         drift_m=residual_drift_m(config.sensor, imager_k),
-        power_price=_log_uniform(config.reward.power, unit[4:5]),
+        power_price=_chosen(options.power_price, _log_uniform(config.reward.power, unit[4:5])),
         always_four=always_four,
         always_eight=always_eight,
     )
@@ -167,6 +198,10 @@ def chain_clips(clips: Sequence[Clip], length: int, *, generator: torch.Generato
         skipped = int(begin * last.frames) if first else 0
         frames.extend(range(last.start + skipped, last.start + last.frames))
     return torch.tensor(frames[:length])
+
+
+def _chosen(value: float | None, drawn: Tensor) -> Tensor:
+    return drawn if value is None else torch.full_like(drawn, value)
 
 
 def _uniform(bounds: Range, unit: Tensor) -> Tensor:

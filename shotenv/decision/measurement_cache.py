@@ -23,10 +23,11 @@ choices in 650 drives of 256 frames."""
 class MeasurementCache:
     """`measure_frames`, keeping what each (drive, frame, shots) gave; for one problem.
 
-    What an acquisition gives depends on the drive, the frame and the shots alone, so an
-    environment that plays the same drives again need not acquire again. What comes first is kept,
-    up to `most_kept` frames, and later ones are measured every time: with drives that come in
-    turns, dropping the oldest for the newest would lose each of them just before its return.
+    What an acquisition gives depends on the drive (its seed and what was set of it), the frame and
+    the shots alone, so an environment that plays the same drives again need not acquire again.
+    What comes first is kept, up to `most_kept` frames, and later ones are measured every time:
+    with drives that come in turns, dropping the oldest for the newest would lose each of them just
+    before its return.
 
     Parameters
     ----------
@@ -36,7 +37,7 @@ class MeasurementCache:
 
     def __init__(self, most_kept: int = MOST_KEPT) -> None:
         self.most_kept = most_kept
-        self._rows: dict[tuple[int, int, int], list[float]] = {}
+        self._rows: dict[tuple, list[float]] = {}
 
     def __len__(self) -> int:
         """Frames kept, counted once for each number of samples."""
@@ -54,10 +55,10 @@ class MeasurementCache:
         # A derated laser has a power of its own every time, which hardly ever comes again.
         if power_w is not None and drive.is_derated(power_w):
             return measure_frames(problem, drive, step, shots, power_w)
-        keys = [
-            (seed, frame, int(shots))
-            for seed, frame in zip(drive.seed.tolist(), step.tolist(), strict=True)
-        ]
+        # A seed names a drive but for what options of `reset` set of it.
+        body = drive.laser_power_w, drive.integration_s, drive.ambient_k
+        parts = [part.tolist() for part in (drive.seed, step, drive.frame(step), *body)]
+        keys = [(*key, int(shots)) for key in zip(*parts, strict=True)]
         missing = [i for i, key in enumerate(keys) if key not in self._rows]
         new = {}
         if missing:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from shotenv.decision.drive import Drive, draw_drive
+from shotenv.decision.drive import DRAWN, Drive, DriveOptions, draw_drive
 from shotenv.decision.measurement import Measure, measure_by_shots, measure_frames
 from shotenv.decision.problem import Problem
 from shotenv.decision.rewards import reference_terms, reward, reward_terms
@@ -65,8 +65,11 @@ class Outcome:
 
 
 @torch.inference_mode()
-def reset(problem: Problem, seeds: Sequence[int]) -> State:
-    """Start of the drives with the given seeds, one for each environment of the batch."""
+def reset(problem: Problem, seeds: Sequence[int], options: DriveOptions = DRAWN) -> State:
+    """Start of the drives with the given seeds, one for each environment of the batch.
+
+    `options` set something of all of them.
+    """
     config, bank = problem.config, problem.bank
     drive = concatenate(
         [
@@ -77,6 +80,7 @@ def reset(problem: Problem, seeds: Sequence[int]) -> State:
                 bank.height,
                 bank.width,
                 network=problem.network_work,
+                options=options,
             )
             for seed in seeds
         ]

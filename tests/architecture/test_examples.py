@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import doctest
-import importlib
+import importlib.util
+import json
 import math
 import re
+import sys
 from pathlib import Path
 
 import gymnasium
@@ -56,7 +58,45 @@ def test_the_quickstart_runs(small_env, capsys):
     exec((ROOT / "examples" / "quickstart.py").read_text("utf-8"), {})
     *rows, last = capsys.readouterr().out.splitlines()
     assert len(rows) == 3
-    assert re.fullmatch(r"return -\d+\.\d", last)
+    assert re.fullmatch(r"return -?\d+\.\d", last)
+
+
+def example(name: str):
+    """The module of a file in `examples/`."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "examples" / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_one_file_ppo_learns_and_is_judged(tiny_kwargs, capsys):
+    ppo, environment = example("one_file_ppo"), {**tiny_kwargs, "frames_per_drive": 8}
+    small = {"envs": 4, "rollout": 12, "minibatches": 2, "steps": 96, "drives": 2}
+    returns = ppo.main(ppo.Config(**small, environment=environment))
+    assert set(returns) == {"trained", "always 2", "always 4", "always 8"}
+    rows = capsys.readouterr().out.splitlines()
+    assert rows[1].startswith("      96 frames") and len(rows) == 2 + 4
+
+
+@pytest.mark.parametrize("algorithm", ["PPO", "DQN"])
+def test_stable_baselines3_learns_through_the_adapter(tiny_kwargs, algorithm):
+    environment = {**tiny_kwargs, "frames_per_drive": 8}
+    mean = example("stable_baselines").main(algorithm, 64, 2, 2, environment)
+    assert math.isfinite(mean)
+
+
+def test_the_notebook_runs_from_top_to_bottom(monkeypatch, tiny_kwargs, capsys):
+    make, small = gymnasium.make, {**tiny_kwargs, "frames_per_drive": 6}
+    monkeypatch.setattr(gymnasium, "make", lambda name, **chosen: make(name, **small, **chosen))
+    cells = json.loads((ROOT / "examples" / "tour.ipynb").read_text("utf-8"))["cells"]
+    names: dict[str, object] = {}
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            assert cell["outputs"] == [], "committed without outputs"
+            exec("".join(cell["source"]), names)
+    assert "always 8: return" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", WITH_EXAMPLES)

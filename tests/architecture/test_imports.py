@@ -114,6 +114,8 @@ ONLY_IN = {
     "lightning": "unwrap/training/",
     "numba": "unwrap/support/compiled.py",
     "plotly": "agents/report/",
+    "pygame": "shotenv/env/",
+    "minari": "agents/evaluation/",
     "jinja2": ("agents/report/", "unwrap/comparison/"),
     "PIL": ("unwrap/pictures/", "unwrap/recordings/", "unwrap/comparison/", "shotenv/"),
     "onnx": "unwrap/export/",

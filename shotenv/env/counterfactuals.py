@@ -1,0 +1,53 @@
+"""`outcomes=True`: what every action would have brought in a frame, beside what was chosen."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from shotenv.decision import Measure, Problem, State, step
+from shotenv.env.arguments import ACTIONS
+from shotenv.env.info import Columns, info_columns
+
+TOLD = (
+    "shots",
+    "energy_j",
+    "laser_energy_j",
+    "temperature_k",
+    "depth_mae_m",
+    "depth_rmse_m",
+    "wrap_accuracy",
+    "valid_share",
+    "tripped",
+    "cost",
+    "vector_reward",
+)
+"""Keys of `info` that are told of every action; `reward` stands beside them."""
+
+
+def outcome_columns(
+    problem: Problem, family_codes: Tensor, before: State, measure: Measure
+) -> Columns:
+    """What each action would bring in the frames at `before` [B]: arrays [B, 3, ...].
+
+    Exact counterfactuals, not estimates: the transition is played with each of them, with the
+    noise of the frame itself, and the one that is then chosen brings just this.
+    """
+    tried = []
+    for action in range(ACTIONS):
+        actions = torch.full_like(before.step, action)
+        after, outcome = step(problem, before, actions, measure=measure)
+        columns = info_columns(problem, family_codes, before, after, outcome)
+        tried.append({name: columns[name] for name in TOLD} | {"reward": outcome.reward.numpy()})
+    return {name: np.stack([one[name] for one in tried], axis=1) for name in tried[0]}
+
+
+def no_outcomes(columns: Columns) -> Columns:
+    """What stands for them before the first frame, of drives with the infos `columns`: zeros."""
+    batch = len(columns["shots"])
+    found = {
+        name: np.zeros((batch, ACTIONS, *columns[name].shape[1:]), columns[name].dtype)
+        for name in TOLD
+    }
+    return found | {"reward": np.zeros((batch, ACTIONS))}
