@@ -56,7 +56,7 @@ def measure_configuration(arguments: Namespace) -> int:
             for split, count in counts.items()
         )
     # Policies are tuned on validation clips and judged on those of the study's split.
-    measured = measure_problem(training, validation, test, config.env.reward, config.study)
+    measured = measure_problem(training, validation, test, config.study)
     found = judged(measured, heat_binds=arguments.goals == "hot")
     print_problem(found, config)
     write_numbers(arguments, found)

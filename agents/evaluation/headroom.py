@@ -31,7 +31,7 @@ from agents.optimum import (
     play,
     threshold,
 )
-from shotenv.config import LaserConfig, RewardConfig
+from shotenv.config import LaserConfig
 from unwrap.signal import Shots
 
 HALF: Final = 0.5
@@ -59,8 +59,9 @@ def measure_problem(
     training: Possible,
     validation: Possible,
     test: Possible,
-    weights: RewardConfig,
     study: StudyConfig,
+    *,
+    price: float | None = None,
 ) -> dict[str, Any]:
     """What the decision problem is like on test drives, with intervals.
 
@@ -68,10 +69,10 @@ def measure_problem(
     ----------
     training, validation, test : Possible
         Drives that teach what can be foreseen, that tune the rule, and that are judged.
-    weights : RewardConfig
-        Weights of the reward.
     study : StudyConfig
         Bootstrap draws and confidence.
+    price : float, optional
+        Weight of power in all drives; each drive's own by default.
 
     Raises
     ------
@@ -84,7 +85,7 @@ def measure_problem(
     favours them; the rule is tuned on the validation drives.
     """
     check_solvable(test.problem.config.laser)
-    table, clips = test.table(weights), test.clips()
+    table, clips = test.table(price=price), test.clips()
     best = clairvoyant(table)
 
     def per_clip(values: np.ndarray) -> np.ndarray:
@@ -97,7 +98,7 @@ def measure_problem(
                 excess, study, per_clip(played.frame_cost), per_clip(best.frame_cost)
             ).named("excess"),
         }
-        for name, (choice, played) in _rivals(validation.table(weights), table).items()
+        for name, (choice, played) in _rivals(validation.table(price=price), table).items()
     }
     working = per_clip((best.actions >= 0).astype(float))
     taken = np.maximum(best.actions, 0)[..., None]
@@ -109,7 +110,7 @@ def measure_problem(
         "clips": len(working),
         "optimum": {
             "cost_per_drive": float(best.cost.mean()),
-            "return_per_drive": float(weights.scale * (table.reference.sum(1) - best.cost).mean()),
+            "return_per_drive": float(table.returns(best.frame_cost).mean()),
             "shots_share": {
                 str(shots): study_interval(
                     ratio, study, per_clip((best.actions == shots.action).astype(float)), working
@@ -130,7 +131,7 @@ def measure_problem(
         "held_back_drives_share": _held_back(table),
         "frame_explains": frame_explains(test),
         "families": _by_family(test, best),
-        "sweep": [_at_price(test, weights, price) for price in SWEEP],
+        "sweep": [_at_price(test, other) for other in SWEEP],
     }
 
 
@@ -248,9 +249,9 @@ def _by_family(possible: Possible, best: PlayedTable) -> dict[str, list[float]]:
     }
 
 
-def _at_price(test: Possible, weights: RewardConfig, price: float) -> dict[str, Any]:
+def _at_price(test: Possible, price: float) -> dict[str, Any]:
     """What another price of power makes of the problem."""
-    table = test.table(weights, price=price)
+    table = test.table(price=price)
     best = clairvoyant(table)
     costs = {shots: play(table, always(shots.action)).cost.sum() for shots in Shots}
     cheapest = min(Shots, key=costs.__getitem__)

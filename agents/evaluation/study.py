@@ -54,7 +54,7 @@ def tune_rule(config: DemoConfig) -> SnrThresholdPolicy:
     frames = len(seeds) * config.env.frames_per_drive
     with progress(frames, "tuning the threshold rule", "frame") as bar:
         possible = tabulate(problem, seeds, tick=bar.update)
-    rule = best_rule(possible.table(config.env.reward))
+    rule = best_rule(possible.table())
     # Shots here, actions there: a policy is told what it takes, a table is indexed.
     below, above = rule.shots
     return SnrThresholdPolicy(FEATURE_NAMES, rule.limit, below=below, above=above)

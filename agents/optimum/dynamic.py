@@ -93,10 +93,15 @@ def _values_to_go(table: DriveTable, grid: _Grid) -> np.ndarray:
     after = table.consequences(on)
     # What is not granted is the same as asking for less: it need not be looked at.
     warmed, barred = _corners(grid, after), table.barred(on, after)
+    none_granted = barred.all(axis=-1)
+    resting = _corners(grid, table.advance(on, np.zeros(on.case_k.shape)))
     cooled = _corners(grid, table.advance(off, np.zeros(off.case_k.shape)))
     for frame in reversed(range(frames)):
         cost, to_go = table.cost_at(frame, on.temperature_k), values[frame + 1]
         working = np.min(np.where(barred, np.inf, cost + _look_up(to_go, warmed)), axis=-1)
+        if none_granted.any():
+            dark = table.dark_cost[:, frame, None] + _look_up(to_go, resting)
+            working = np.where(none_granted, dark, working)
         tripped = table.tripped_cost[:, frame, None] + _look_up(to_go, cooled)
         values[frame] = working.reshape(shape), tripped.reshape(shape)
     return values

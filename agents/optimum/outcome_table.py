@@ -60,8 +60,9 @@ class DriveTable:
     surplus : callable
         Share by which that energy is more at a junction temperature [N, ...] than at 25 C; any
         shape that broadcasts.
-    tripped_cost : float64 [N, T]
-        Cost of a frame in which the laser is off because it tripped.
+    dark_cost, tripped_cost : float64 [N, T]
+        Cost of a frame in which the laser is off because even the fewest samples would trip it,
+        and because it tripped.
     heat_j : float64 [N, A]
         Heat that each action leaves in the laser, at 25 C.
     start_k : float64 [N]
@@ -75,6 +76,8 @@ class DriveTable:
     advance : callable
         The laser's thermal model over one frame: (laser, heat at 25 C) to the next laser; the two
         broadcast. With `tripped`, the heat given is zero.
+    scale : float
+        Factor of returns.
     protect : bool
         Whether fewer shots are granted where those asked for would trip the laser.
     """
@@ -85,6 +88,7 @@ class DriveTable:
     depth_mae_m: np.ndarray
     laser_cost: np.ndarray
     surplus: Callable[[np.ndarray], np.ndarray]
+    dark_cost: np.ndarray
     tripped_cost: np.ndarray
     heat_j: np.ndarray
     start_k: np.ndarray
@@ -92,7 +96,12 @@ class DriveTable:
     span_k: tuple[float, float]
     highest_rise_k: float
     advance: Advance
+    scale: float
     protect: bool
+
+    def returns(self, frame_cost: np.ndarray) -> np.ndarray:
+        """Returns [N] of drives that cost `frame_cost` [N, T]: what they cost less than 4 DCS."""
+        return self.scale * (self.reference - frame_cost).sum(axis=1)
 
     def cost_at(self, frame: int, temperature_k: np.ndarray) -> np.ndarray:
         """Cost of each action at junction temperatures [N, ...]: [N, ..., A].
@@ -115,17 +124,16 @@ class DriveTable:
     def barred(self, laser: ThermalState, after: ThermalState) -> np.ndarray:
         """Actions [N, ..., A] that are not granted: they would trip a laser that protects itself.
 
-        `after` are the lasers' `consequences`. The first action is always granted.
+        `after` are the lasers' `consequences`.
         """
-        before = np.expand_dims(laser.tripped, -1)
-        return after.tripped & ~before & (np.arange(self.cost.shape[-1]) > 0) & self.protect
+        return after.tripped & ~np.expand_dims(laser.tripped, -1) & self.protect
 
     def granted(self, laser: ThermalState, actions: np.ndarray) -> np.ndarray:
-        """Actions [N] that are taken of those asked for: the next lower that is not barred."""
+        """Actions [N] taken of those asked for: the next lower not barred, -1 where all are."""
         barred = self.barred(laser, self.consequences(laser))
         rows = np.arange(len(actions))
-        for _ in range(barred.shape[-1] - 1):
-            actions = actions - barred[rows, actions]
+        for _ in range(barred.shape[-1]):
+            actions = actions - ((actions >= 0) & barred[rows, actions])
         return actions
 
     def start(self) -> ThermalState:
@@ -207,13 +215,13 @@ def play(table: DriveTable, choose: Choice) -> PlayedTable:
     actions, frame_cost = np.empty((drives, frames), np.int64), np.empty((drives, frames))
     for frame in range(frames):
         now = Situation(frame, laser, snr, table)
-        taken = table.granted(laser, choose(now))
-        # A tripped laser takes no samples: nothing is told, nothing warms, the action is void.
-        actions[:, frame] = np.where(laser.tripped, -1, taken)
-        off = table.tripped_cost[:, frame]
-        frame_cost[:, frame] = np.where(laser.tripped, off, now.cost[rows, taken])
-        snr = np.where(laser.tripped, snr, table.snr[rows, frame, taken])
-        heat_j = np.where(laser.tripped, 0.0, table.heat_j[rows, taken])
+        # Without laser no samples are taken: nothing is told, nothing warms, the action is void.
+        taken = np.where(laser.tripped, -1, table.granted(laser, choose(now)))
+        off, actions[:, frame] = taken < 0, taken
+        off_cost = np.where(laser.tripped, table.tripped_cost[:, frame], table.dark_cost[:, frame])
+        frame_cost[:, frame] = np.where(off, off_cost, now.cost[rows, taken])
+        snr = np.where(off, snr, table.snr[rows, frame, taken])
+        heat_j = np.where(off, 0.0, table.heat_j[rows, taken])
         laser = table.advance(laser, heat_j)
     return PlayedTable(actions, frame_cost)
 

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from agents.optimum.outcome_table import Advance, DriveTable, ThermalState
 from agents.policies import SNR_FEATURE
-from shotenv.config import LaserConfig, RewardConfig
+from shotenv.config import LaserConfig
 from shotenv.decision import (
     SEEN_FEATURES,
     Drive,
@@ -48,25 +48,25 @@ class Possible:
     drives: tuple[Drive, ...]
     outcomes: tuple[Outcomes, ...]
 
-    def table(self, weights: RewardConfig, *, price: float | None = None) -> DriveTable:
-        """The table that choices are played on, with these reward weights.
+    def table(self, *, price: float | None = None) -> DriveTable:
+        """The table that choices are played on.
 
         Without derating: power that follows the temperature would change what is measured, and
         the outcomes would depend on the actions before.
 
         Parameters
         ----------
-        weights : RewardConfig
         price : float, optional
             Weight of power in all drives; each drive's own by default.
         """
         period_s, laser = self.problem.frame_period_s, self.problem.config.laser
+        weights = self.problem.config.reward
         ambient_k = np.array([float(drive.ambient_k) for drive in self.drives])
         heat_j = self._stacked(lambda one: one.heat_j[0])
         prices = [drive.power_price for drive in self.drives]
         if price is not None:
             prices = [torch.full_like(own, price) for own in prices]
-        cost, reference, off = (
+        cost, reference, off, dark = (
             np.stack(
                 [
                     weighted(terms(one), own, weights).numpy()
@@ -77,6 +77,7 @@ class Possible:
                 lambda one: one.terms,
                 lambda one: one.reference,
                 lambda one: one.tripped_terms,
+                lambda one: {**one.tripped_terms, "tripped": torch.zeros(1)},
             )
         )
         # At 25 C the laser turns `efficiency` of its energy into light and the rest into heat; its
@@ -90,6 +91,7 @@ class Possible:
             depth_mae_m=self._stacked(lambda one: one.score.depth_mae_m),
             laser_cost=torch.cat(prices).numpy()[:, None] * laser_j / whole_j[:, None],
             surplus=lambda temperature_k: energy_surplus(temperature_k, laser),
+            dark_cost=np.broadcast_to(dark.reshape(-1, 1), cost.shape[:2]),
             tripped_cost=np.broadcast_to(off.reshape(-1, 1), cost.shape[:2]),
             heat_j=heat_j,
             snr=self._stacked(lambda one: one.features[..., SNR_COLUMN]),
@@ -97,6 +99,7 @@ class Possible:
             span_k=_span_k(ambient_k, heat_j, laser, period_s),
             highest_rise_k=laser.junction_resistance_k_per_w * _hottest_j(heat_j, laser) / period_s,
             advance=thermal_model(ambient_k, laser, period_s),
+            scale=weights.scale,
             protect=self.problem.config.protect,
         )
 

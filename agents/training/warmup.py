@@ -70,7 +70,7 @@ def known_frames(
     1 + `ROLLOUTS` times those of the drives in all.
     """
     problem = envs.problem
-    cost = tabulate(problem, seeds, tick=tick).table(problem.config.reward).cost
+    cost = tabulate(problem, seeds, tick=tick).table().cost
     seen = []
     # The same frames are met again with other memories: what was seen last depends on the actions.
     for number in range(ROLLOUTS):

@@ -33,6 +33,8 @@ from unwrap.support import concatenate
 
 SHOTS_OF_ACTION = torch.tensor([int(shots) for shots in Shots])
 """Samples that each action asks for: 2, 4, 8."""
+NEXT_LOWER = torch.tensor([0, 0, 0, 0, 2, 0, 0, 0, 4])
+"""Samples of the next shorter acquisition, by number of samples; none below two."""
 
 
 @dataclass(frozen=True)
@@ -138,25 +140,25 @@ def step(
 def granted(problem: Problem, drive: Drive, laser: LaserState, asked: Tensor) -> Tensor:
     """Samples [B] that the sensor takes of those asked for, int64 [B].
 
-    A sensor that protects itself takes the next lower number where those asked for would bring
-    the laser to its trip in this frame; two are always taken.
+    A sensor that protects itself takes the next lower number, in the end none, where those asked
+    for would bring the laser to its trip in this frame: a frame without laser is one, a trip many.
     """
     if not problem.config.protect:
         return asked
     shots = asked
-    # From 8 to 4, and to 2. Most frames are far from the trip, and one look is enough for all.
-    for _ in range(len(Shots) - 1):
-        too_hot = would_trip(problem, drive, laser, shots) & (shots > Shots.TWO)
+    # Most frames are far from the trip, and one look is enough for all.
+    for _ in Shots:
+        too_hot = would_trip(problem, drive, laser, shots) & (shots > 0)
         if not too_hot.any():
             break
-        shots = torch.where(too_hot, shots // 2, shots)
+        shots = torch.where(too_hot, NEXT_LOWER.take(shots), shots)
     return shots
 
 
 def allowed_actions(problem: Problem, state: State) -> Tensor:
-    """Which actions a sensor that protects itself would take as they are, bool [B, 3].
+    """Which actions the laser can take as they are without tripping, bool [B, 3].
 
-    All of them while the laser is off, for none is taken then.
+    Fewest samples always; and all while the laser is off, for none is taken then.
     """
     return torch.stack(
         [

@@ -180,7 +180,7 @@ def test_demo_does_the_main_job(capsys, tmp_path, tiny):
     assert results == json.loads((tmp_path / "n.json").read_text())
     assert set(results["policies"]) == {
         *("ppo", "snr_threshold", "cycle", "random"),
-        *("always_2", "always_4", "always_8", "always_8_guarded"),
+        *("always_2", "always_4", "always_8"),
     }
     for policy in results["policies"].values():
         assert set(policy["return"]) == {"mean", "low", "high"}
@@ -196,7 +196,7 @@ def test_problem_writes_its_numbers(capsys, tmp_path, tiny):
     bank, unwrapper = tiny[1], tiny[3]
     measured = f"bank {bank}, unwrapper {unwrapper}, laser vcsel"
     held = "holds" if json.loads(path.read_text())["holds"] else "DOES NOT hold"
-    assert out.startswith(f"{measured}; reward: error 1, ")
+    assert out.startswith(f"{measured}; reward: error 1.0, ")
     assert out.endswith(f"This problem ({measured}) {held} every goal.\n")
     shares = json.loads(path.read_text())["optimum"]["shots_share"]
     assert sum(share["mean"] for share in shares.values()) == pytest.approx(1.0)

@@ -59,7 +59,7 @@ def test_verdict_says_what_the_interval_says(difference, says):
 
 def test_strongest_rival_is_named_with_its_interval():
     results = made_up_results()
-    assert "always 8 DCS, guarded, its return is +0.4" in rival_note(results)
+    assert "cycle, its return is +0.4" in rival_note(results)
     assert "-0.2 to +1.1, which includes zero" in rival_note(results)
     results["paired_to_best_rival"] = {"difference": 0.4, "low": 0.1, "high": 1.1}
     assert "zero" not in rival_note(results)

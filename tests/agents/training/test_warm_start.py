@@ -12,7 +12,7 @@ from agents.training.ppo import Trainer
 from agents.training.sb3_vector import Sb3VecEnv
 from agents.training.warmup import ROLLOUTS, KnownFrames, known_frames, warm_start
 from shotenv.config.keywords import env_config
-from shotenv.decision.features import FEATURE_NAMES, SCENE_FEATURES
+from shotenv.decision.features import SCENE_FEATURES
 
 
 @pytest.fixture
@@ -73,4 +73,7 @@ def test_known_costs_are_those_of_the_frames_they_stand_beside(
     played = play_drives(FixedPolicy(2), envs, seeds)
     cost = known.cost.reshape(*shape, 3)[0, ..., 0].numpy()
     assert (played.shots == 2).all()
-    np.testing.assert_allclose(-played.reward, cost, rtol=1e-4)
+    # Rewards are relative to 4 DCS, which no choice changes, and scaled.
+    four = known.cost.reshape(*shape, 3)[0, ..., 1].numpy()
+    expected = config.reward.scale * (four - cost)
+    np.testing.assert_allclose(played.reward, expected, rtol=1e-4, atol=1e-5)

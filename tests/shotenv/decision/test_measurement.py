@@ -90,9 +90,7 @@ def test_the_reference_is_the_error_of_four_whatever_is_taken(problem):
 
 def test_prefixes_measure_as_acquisitions_of_their_own(problem):
     state = reset(problem, [3])
-    for shots, found in zip(
-        Shots, measure_prefixes(problem, state.drive, state.step), strict=True
-    ):
+    for shots, found in zip(Shots, measure_prefixes(problem, state.drive, state.step), strict=True):
         alone = measure_frames(problem, state.drive, state.step, shots)
         told = [feature.least_shots <= shots for feature in SEEN_FEATURES]
         assert torch.equal(found.features[:, told], alone.features[:, told])

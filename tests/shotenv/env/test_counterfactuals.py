@@ -14,7 +14,8 @@ from shotenv.env.counterfactuals import TOLD
 @pytest.fixture
 def hot(tiny_kwargs):
     """Drives in which the laser trips: what an action brings depends on those before."""
-    return {**tiny_kwargs, "laser": {"trip_k": 318.0, "release_k": 314.0}, "frames_per_drive": 60}
+    laser = {"trip_k": 318.0, "release_k": 314.0, "ambient_k": [304.15, 310.15]}
+    return {**tiny_kwargs, "laser": laser, "protect": False, "frames_per_drive": 60}
 
 
 @pytest.mark.parametrize("remember", [False, True])

@@ -60,8 +60,9 @@ def test_depth_is_averaged_over_valid_pixels(tiny_kwargs):
 
 
 def test_a_frame_without_laser_shows_no_depth(tiny_kwargs):
-    laser = {"trip_k": 318.0, "release_k": 314.0, "optical_power_w": [10, 10]}
-    env = make(shotenv.IMAGE_ENV_ID, tiny_kwargs, laser=laser, frames_per_drive=256)
+    laser = {"trip_k": 318.0, "release_k": 314.0, "ambient_k": [304.15, 310.15]}
+    hot = {"laser": laser, "protect": False, "frames_per_drive": 256}
+    env = make(shotenv.IMAGE_ENV_ID, tiny_kwargs, **hot)
     env.reset(seed=0, options={"ambient_k": 313.9, "laser_power_w": 90.0})
     for _ in range(256):
         observation, _, _, _, info = env.step(2)

@@ -93,7 +93,7 @@ def test_energy_of_each_choice_by_hand(laser):
 
 def test_a_network_that_looks_at_samples_runs_where_there_are_some(laser):
     found = cost(laser, [0, 2, 4, 8], network=NetworkWork(gray=1e9, samples=3e9))
-    assert found.network_energy_j.tolist() == pytest.approx([1e-3, 4e-3, 4e-3, 4e-3])
+    assert found.network_energy_j.tolist() == pytest.approx([1e-3, 4e-3, 7e-3, 10e-3])
 
 
 @pytest.mark.parametrize("temperature_k", [290.0, 320.0, 336.0])
@@ -241,7 +241,8 @@ def test_rated_conditions_use_one_hour_in_an_hour(detailed):
 
 
 def test_life_is_used_only_while_on(laser, detailed):
-    plain = cost(laser, [0, 2, 8]).life_used_h
+    ageless = laser.model_copy(update={"ageing_exponent": 0.0, "activation_energy_ev": 0.0})
+    plain = cost(ageless, [0, 2, 8]).life_used_h
     torch.testing.assert_close(plain, kelvin(0, 2, 8) * 6e-4 / 3600)
     hot = cost(detailed, [0, 8], power_w=7.15, temperature_k=333.15).life_used_h
     current = 0.42 / 0.35  # The efficiency that 35 K took away.
@@ -324,7 +325,7 @@ def test_what_is_off_is_not_checked(laser):
 
 
 def test_defaults_make_planning_worthwhile(laser):
-    """Trip and release lie at about .5 and .4 of the always-8 rise: four settle near the trip."""
+    """Heat holds back always-8 in some drives and not in most, and always-2 next to never."""
     sensor = read_config(SensorConfig, find_config("sensor", "epc660"))
     unit = np.random.default_rng(0).random((3, 10_000))
     power_w, integration_s = (
@@ -334,9 +335,7 @@ def test_defaults_make_planning_worthwhile(laser):
     ambient_k = laser.ambient_k[0] + unit[2] * (laser.ambient_k[1] - laser.ambient_k[0])
     heat_w = power_w * (1 / laser.efficiency - 1) * 8 * integration_s * 10.0
     rise_k = laser.thermal_resistance_k_per_w * heat_w
-    trip, release = (laser.trip_k - ambient_k) / rise_k, (laser.release_k - ambient_k) / rise_k
-    assert np.median(trip) == pytest.approx(0.5, abs=0.05)
-    assert np.median(release) == pytest.approx(0.4, abs=0.05)
-    # Eight in every frame always trips, two never; what four do depends on the drive.
-    assert (trip < 0.95).all() and (trip > 0.25).all()
-    assert 0.2 < np.mean(trip > 0.5) < 0.8
+    # Of the rise that always-8 would settle at; that of n samples is n / 8 of it.
+    room = (laser.trip_k - ambient_k) / rise_k
+    assert 0.2 < np.mean(room < 1.0) < 0.4
+    assert np.mean(room < 0.25) < 0.05

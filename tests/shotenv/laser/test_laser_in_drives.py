@@ -41,7 +41,8 @@ def hot(tiny_kwargs):
     """Every effect on, and heat that builds up within a few frames."""
     detailed = env_config(laser="vcsel_detailed").laser.model_dump()
     laser = {**detailed, "thermal_time_constant_s": 2.0, "junction_time_constant_s": 0.5}
-    return {**tiny_kwargs, "laser": {**laser, "eye_window_s": 1.0, "eye_limit_w": 0.15}}
+    laser |= {"eye_window_s": 1.0, "eye_limit_w": 0.15}
+    return {**tiny_kwargs, "laser": laser, "protect": False}
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +103,7 @@ def test_derating_does_not_excuse_pixels(problem):
         for power_w in (None, weak_w)
     ]
     assert torch.equal(made[0].scored, made[1].scored)
-    assert made[1].depth.amplitude.mean() < 0.6 * made[0].depth.amplitude.mean()
+    assert made[1].depth.amplitude.mean() < 0.65 * made[0].depth.amplitude.mean()
 
 
 def test_a_cool_laser_is_not_derated(problem):
@@ -142,12 +143,14 @@ def test_remembering_changes_nothing(hot):
 
 @pytest.fixture(scope="module")
 def two_stages(tiny_kwargs):
-    return env_config(**{**tiny_kwargs, "frames_per_drive": 24, "laser": TWO_STAGES})
+    return env_config(
+        **{**tiny_kwargs, "frames_per_drive": 24, "laser": TWO_STAGES, "protect": False}
+    )
 
 
 def test_the_table_follows_two_stages_and_a_falling_efficiency(two_stages):
     problem = open_problem(two_stages.model_copy(update={"split": "test"}))
-    table = tabulate(problem, SEEDS).table(two_stages.reward)
+    table = tabulate(problem, SEEDS).table()
     envs = make_envs(two_stages, "test", len(SEEDS), "Disabled")
     for policy in (FixedPolicy(8), FixedPolicy(4), RandomPolicy(1)):
         played = play_drives(policy, envs, SEEDS)
@@ -155,7 +158,9 @@ def test_the_table_follows_two_stages_and_a_falling_efficiency(two_stages):
         actions = np.array(again).reshape(-1, len(SEEDS))
         on_table = play(table, lambda now, actions=actions: actions[now.frame])
         np.testing.assert_array_equal(played.shots == 0, on_table.actions < 0)
-        np.testing.assert_allclose(played.per_drive["return"], -on_table.cost, rtol=1e-9)
+        np.testing.assert_allclose(
+            played.per_drive["return"], table.returns(on_table.frame_cost), rtol=1e-9
+        )
     assert (play(table, lambda now: np.full(3, 2)).actions < 0).any(), "nothing tripped"
     assert clairvoyant(table).cost.sum() <= greedy(table, guarded=True).cost.sum() + 1e-6
 
