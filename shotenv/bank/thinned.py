@@ -258,7 +258,7 @@ def _type_of(name: str) -> str:
 
 def _planes(array: np.ndarray) -> np.ndarray:
     """Bytes of an array, those of equal worth together: uint8 [bytes of a value, ...]."""
-    little = array.astype(array.dtype.newbyteorder("<"))
+    little = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
     apart = little.view(np.uint8).reshape(*array.shape, array.dtype.itemsize)
     return np.moveaxis(apart, -1, 0)
 

@@ -77,7 +77,7 @@ class SensedFrames:
         stride: int = 1,
         remembers: bool = False,
     ) -> None:
-        require_full(bank, "a network's training and judging")
+        require_full(bank, "training and judging networks")
         check_fits(bank, config.sensor)
         self.bank, self.frames, self.range_m = bank, frames, range_m
         self.truth_of, self.stride, self.remembers = truth, stride, remembers
