@@ -48,10 +48,9 @@ def test_the_row_of_a_bank_says_what_its_configuration_gives(name):
 
 def test_the_page_says_how_large_the_bank_is_that_ships():
     pocket = KNOWN["pocket"]
-    assert (
-        f"{pocket['frames']} frames of {pocket['width']} x {pocket['height']} pixels (of 160 x 120) "
-        f"in {pocket['clips']} clips of every split, {pocket['bytes'] / 1e6:.1f} MB"
-    ) in TEXT
+    size = f"{pocket['width']} x {pocket['height']} pixels (of 160 x 120)"
+    clips = f"{pocket['clips']} clips of every split, {pocket['bytes'] / 1e6:.1f} MB"
+    assert f"{pocket['frames']} frames of {size} in {clips}" in TEXT
 
 
 def test_the_families_are_as_many_as_the_page_says():
