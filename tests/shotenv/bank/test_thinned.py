@@ -9,20 +9,25 @@ import os
 import shutil
 import subprocess
 import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
 from agents.cli.entry import main
+from agents.optimum.tabulation import tabulate
 from shotenv.bank import thinned as thinned_file
 from shotenv.bank.bank import require_full
 from shotenv.bank.contact_sheets import contact_sheet
 from shotenv.bank.layout import BankError
 from shotenv.bank.opening import find_thinned, open_bank
+from shotenv.bank.predictions import keep_predictions
 from shotenv.bank.store import verify
 from shotenv.bank.thinned import FARTHEST_M, ThinnedBank, decode_light, encode_light
 from shotenv.config.keywords import env_config
+from shotenv.dataset.bank_scores import measure_unwrapping
 from shotenv.dataset.export_inputs import choose_check_bank
 from shotenv.dataset.sensed_frames import SensedFrames
 from shotenv.dataset.thinning import draw_positions, thin_bank
@@ -39,6 +44,7 @@ from shotenv.sensor.acquisition import (
     sensitivity,
 )
 from shotenv.sensor.exposure import Exposure
+from unwrap.networks.predictor import load_unwrapper
 from unwrap.networks.tofregnet import TofRegNet
 from unwrap.networks.weight_files import save_weights
 from unwrap.signal import Shots, decode
@@ -135,7 +141,7 @@ def test_nothing_underflows_eight_decades_below_the_brightest_pixel():
 
 
 def test_phases_err_far_less_than_the_best_pixel_is_noisy(sensor):
-    """Best: eight samples of a full well, whose shot noise alone is 3 mrad."""
+    """Best: four samples of full wells, whose shot noise alone is 1.5 mrad."""
     maps = made_light(np.geomspace(1e-6, 20.0, 3600).reshape(1, 60, 60))
     stored, units = encode_light(maps)
     light = decode_light({n: stored[n] for n in stored if n != "gray"}, **units)
@@ -143,9 +149,9 @@ def test_phases_err_far_less_than_the_best_pixel_is_noisy(sensor):
     error = decode(light.correlation[0, :4]).phase_rad - exact
     error = (error + math.pi) % (2 * math.pi) - math.pi
     rms = float(error.square().mean().sqrt())
-    # Two taps share the electrons of a sample: 1 / (contrast sqrt(N)) of four samples, N in all.
-    electrons = 4 * 2 * sensor.full_well_e
-    best_noise_rad = math.sqrt(2 / electrons) / sensor.contrast
+    # N electrons a sample, amplitude m N: D0 - D2 has the noise sqrt(2 N) on 2 m N.
+    electrons = 2 * sensor.full_well_e
+    best_noise_rad = 1.0 / (sensor.contrast * math.sqrt(2.0 * electrons))
     assert rms < 0.12 * best_noise_rad
     assert float(error.abs().max()) < 0.5 * best_noise_rad
 
@@ -254,12 +260,17 @@ def test_predictions_of_other_weights_are_refused(thinned, tiny_kwargs, tmp_path
         open_problem(env_config(**{**kwargs, "unwrapper": "no-such-file"}))
 
 
-def test_networks_are_neither_trained_nor_checked_on_it(thinned, sensor):
+def test_networks_are_neither_trained_nor_checked_on_it(thinned, sensor, tiny_kwargs):
     config = env_config(bank=str(thinned.folder))
     with pytest.raises(BankError, match="training and judging networks needs neighbours"):
         SensedFrames(thinned, thinned.frames("train"), config, range_m=25.0)
     with pytest.raises(BankError, match="the check of an export needs neighbours"):
         choose_check_bank(str(thinned.folder), sensor)
+    problem = open_problem(env_config(**tiny_kwargs).model_copy(update={"bank": config.bank}))
+    with pytest.raises(BankError, match="the comparison of unwrapping methods needs neighbours"):
+        measure_unwrapping(problem)
+    with pytest.raises(BankError, match="the network tofregnet needs neighbours"):
+        keep_predictions(thinned, load_unwrapper(tiny_kwargs["unwrapper"]))
     with pytest.raises(BankError, match="a contact sheet needs neighbours"):
         contact_sheet(thinned)
 
@@ -417,3 +428,27 @@ def test_the_bank_that_ships_plays_without_renderer_networks_or_cache(tmp_path):
     ]
     assert found[0] == found[1] and math.isfinite(float(found[0]))
     assert not cache.exists()
+
+
+def agreement():
+    """The script docs/pocket_agreement.py."""
+    path = Path(__file__).parents[3] / "docs" / "pocket_agreement.py"
+    spec = spec_from_file_location(path.stem, path)
+    script = module_from_spec(spec)
+    spec.loader.exec_module(script)
+    return script
+
+
+def test_the_script_tells_another_problem_from_the_same(full, tiny_unwrapper):
+    script = agreement()
+    config = env_config(
+        bank=str(full.folder), unwrapper=tiny_unwrapper, split="test", frames_per_drive=16
+    )
+    problem = open_problem(config)
+    table = tabulate(problem, range(4)).table(problem.config.reward)
+    same = script.compare(table, table)
+    assert same["holds"] and len(same["choices"]) == 11 and abs(same["excess"]) < 1e-9
+    # 2 DCS as dear as 8, and the other way round.
+    other = script.compare(table, dataclasses.replace(table, cost=table.cost[..., ::-1].copy()))
+    assert not other["holds"] and ("always 2", "always 8") in other["swapped"]
+    assert other["excess"] > 0.02
