@@ -6,7 +6,7 @@ import io
 from pathlib import Path
 
 from jsonargparse import ArgumentParser, Namespace
-from jsonargparse.typing import PositiveFloat, PositiveInt
+from jsonargparse.typing import NonNegativeInt, PositiveFloat, PositiveInt
 
 from agents.cli.command import (
     DONE,
@@ -97,17 +97,57 @@ def verify_arguments(parser: ArgumentParser) -> None:
 
 def verify_bank(arguments: Namespace) -> int:
     """Check every file of a bank against its checksum."""
-    from shotenv.bank import open_bank, verify
+    from shotenv.bank import cure_for, open_bank, verify
 
     bank = open_bank(arguments.bank, render=False)
     with progress(len(bank.clips), "verifying", "clip") as bar:
         damaged = verify(bank.folder, tick=bar.update)
     for path in (bank.folder / name for name in damaged):
-        say(f"shotenv: {path} is damaged; delete {path.parent} and render the bank again")
+        say(f"shotenv: {path} is damaged; {cure_for(path)}")
     if not damaged:
         print(f"{bank.folder}: every file is as it was written")
     write_numbers(arguments, {"folder": str(bank.folder), "damaged": list(damaged)})
     return FAILED if damaged else DONE
+
+
+def thin_arguments(parser: ArgumentParser) -> None:
+    """Which bank, how few of its pixels, and where to."""
+    parser.add_argument("bank", help="name or path of a rendered bank")
+    parser.add_argument(
+        "--every", type=PositiveInt, default=8, help="a pixel of each so many squared"
+    )
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write")
+    parser.add_argument("--name", help="of the thinned bank; the folder's by default")
+    parser.add_argument("--seed", type=NonNegativeInt, default=0, help="of the positions")
+    parser.add_argument(
+        "--networks",
+        nargs="+",
+        default=["tofregnet", "tofsegnet"],
+        help="names or files of gray networks whose predictions are kept",
+    )
+    add_json(parser)
+
+
+def write_thinned_bank(arguments: Namespace) -> int:
+    """Make a thinned bank of a rendered one."""
+    from shotenv.bank import contents_of, open_bank, print_contents
+    from shotenv.dataset import thin_bank
+
+    bank = open_bank(arguments.bank)
+    with progress(len(bank), "thinning", "frame") as bar:
+        thinned = thin_bank(
+            bank,
+            arguments.out,
+            every=arguments.every,
+            name=arguments.name,
+            seed=arguments.seed,
+            networks=arguments.networks,
+            tick=bar.update,
+        )
+    about = contents_of(thinned)
+    print_contents(about)
+    write_numbers(arguments, about)
+    return DONE
 
 
 def light_arguments(parser: ArgumentParser) -> None:
@@ -165,6 +205,12 @@ COMMANDS = (
         "signal, saturation and gray of a bank, and how long gray errors last",
         light_arguments,
         measure_light,
+    ),
+    Command(
+        "bank thin",
+        "keep a pixel of each few, and what networks make of the full frames",
+        thin_arguments,
+        write_thinned_bank,
     ),
     Command(
         "bank verify",

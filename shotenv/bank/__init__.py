@@ -1,7 +1,8 @@
 """Sequences of frames on disk: rendered once, then read.
 
 `open_bank("starter")` opens a bank by the name of its configuration and renders it into the
-user's cache folder on first use; `open_bank("path/to/bank")` opens a folder.
+user's cache folder on first use; `open_bank("path/to/bank")` opens a folder; `open_bank("pocket")`
+one that comes with the package.
 
     layout.py           what lies in a bank's folder: arrays, records, table of contents
     store.py            writing that whole or not at all; reading and verifying it
@@ -10,7 +11,8 @@ user's cache folder on first use; `open_bank("path/to/bank")` opens a folder.
     clip_rendering.py   one clip from its seed
     build.py            all that are missing, by worker processes
     opening.py          a bank by name or path
-    bank.py             a bank that is open: its clips, splits and frames
+    bank.py             a bank that is open: its clips, splits and frames; one with every pixel
+    thinned.py          one that has a pixel of each few, and what was made of its full frames
     compatibility.py    whether a sensor and a frame rate are those it was made for
     contents.py         what is in a bank, and which there are, in words and numbers
     contact_sheets.py   what it looks like

@@ -1,7 +1,8 @@
-"""A bank, open for reading: memory-mapped, indexed by frame."""
+"""A bank, open for reading, indexed by frame; and the one that has every pixel, memory-mapped."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from shotenv.bank.layout import ARRAYS, BankError, Manifest
+from shotenv.bank.layout import ARRAYS, BankError, Manifest, TableOfContents
 from shotenv.bank.store import read_manifest
 from shotenv.config import TRAINING_FAMILIES, Split
 from shotenv.sensor import Exposure
@@ -99,8 +100,10 @@ class MappedClips:
         return {name: torch.from_numpy(array) for name, array in arrays.items()}
 
 
-class Bank:
+class Bank(ABC):
     """Frames of many clips, indexed 0..len-1, clip after clip.
+
+    `RenderedBank` has every pixel of its frames, `ThinnedBank` one of each few.
 
     Examples
     --------
@@ -109,9 +112,8 @@ class Bank:
     torch.Size([1, 120, 160])
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = Path(folder).resolve()
-        self.manifest: Manifest = read_manifest(self.folder)
+    def __init__(self, folder: Path, manifest: TableOfContents) -> None:
+        self.folder, self.manifest = Path(folder).resolve(), manifest
         starts = np.cumsum([0] + [clip.frames for clip in self.manifest.clips]).tolist()
         self.clips = tuple(
             Clip(c.name, c.family, c.seed, c.split, start, c.frames)
@@ -119,23 +121,37 @@ class Bank:
         )
         # For each frame of the bank the number of its clip.
         self._clip_of_frame = np.repeat(np.arange(len(self.clips)), [c.frames for c in self.clips])
-        self._arrays = MappedClips([self.folder / clip.folder for clip in self.manifest.clips])
         self.time_s = self._per_frame("time_s")
         self.ego_speed_m_s = self._per_frame("ego_speed_m_s")
         self.yaw_rate_rad_s = self._per_frame("yaw_rate_rad_s")
         self.gray_exposure_s = self._per_frame("gray_exposure_s")
 
     def __reduce__(self):
-        # Another process maps the files for itself.
+        # Another process opens the files for itself.
         return (type(self), (self.folder,))
 
     def __len__(self) -> int:
         return len(self._clip_of_frame)
 
     @property
+    def name(self) -> str:
+        """What the bank is called."""
+        return self.manifest.name
+
+    @property
     def config(self):
         """Configuration the bank was rendered from, or None for an imported one."""
         return self.manifest.config
+
+    @property
+    def every(self) -> int:
+        """One pixel of each square of so many down and across is there."""
+        return 1
+
+    @property
+    def is_thinned(self) -> bool:
+        """Whether pixels lack their neighbours."""
+        return self.every > 1
 
     @property
     def height(self) -> int:
@@ -221,17 +237,47 @@ class Bank:
             gray_exposure_s=float(self.gray_exposure_s[index]),
         )
 
+    @abstractmethod
     def exposure(self, indices: Tensor) -> Exposure:
         """Noise-free light of the frames `indices` [B]."""
+
+    @abstractmethod
+    def distance_m(self, indices: Tensor) -> Tensor:
+        """True radial distances float32 [B, H, W] of the frames `indices` [B], metres."""
+
+    @abstractmethod
+    def gray(self, indices: Tensor) -> Tensor:
+        """Gray images uint16 [B, H, W] of the frames `indices` [B]."""
+
+    def _per_frame(self, field: str) -> np.ndarray:
+        return np.concatenate([np.asarray(getattr(clip, field)) for clip in self.manifest.clips])
+
+    def _checked(self, index: int) -> int:
+        if not 0 <= index < len(self):
+            raise IndexError(f"frame index is {index}; expected 0..{len(self) - 1}")
+        return index
+
+
+class RenderedBank(Bank):
+    """A bank that has every pixel, memory-mapped."""
+
+    manifest: Manifest
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder, read_manifest(Path(folder)))
+        self._arrays = MappedClips([self.folder / clip.folder for clip in self.manifest.clips])
+
+    def exposure(self, indices: Tensor) -> Exposure:
+        """See `Bank.exposure`."""
         rows = indices.tolist()
         return Exposure(**{name: self._gather(name, rows) for name in ARRAYS if name != "gray"})
 
     def distance_m(self, indices: Tensor) -> Tensor:
-        """True radial distances float32 [B, H, W] of the frames `indices` [B], metres."""
+        """See `Bank.distance_m`."""
         return self._gather("distance_m", indices.tolist())
 
     def gray(self, indices: Tensor) -> Tensor:
-        """Gray images uint16 [B, H, W] of the frames `indices` [B]."""
+        """See `Bank.gray`."""
         return self._gather("gray", indices.tolist())
 
     def _gather(self, name: str, indices: Sequence[int]) -> Tensor:
@@ -244,13 +290,26 @@ class Bank:
         ]
         return frames[0] if len(frames) == 1 else torch.cat(frames)
 
-    def _per_frame(self, field: str) -> np.ndarray:
-        return np.concatenate([np.asarray(getattr(clip, field)) for clip in self.manifest.clips])
 
-    def _checked(self, index: int) -> int:
-        if not 0 <= index < len(self):
-            raise IndexError(f"frame index is {index}; expected 0..{len(self) - 1}")
-        return index
+def require_full(bank: Bank, what: str) -> None:
+    """Refuse a thinned bank for `what`, which looks at pixels beside each other.
+
+    Raises
+    ------
+    BankError
+        Names the bank, what is asked of it, and the cure.
+    """
+    if bank.is_thinned:
+        raise BankError(
+            f"bank {bank.name} holds every {_ordinal(bank.every)} pixel; {what} needs neighbours: "
+            "choose a rendered bank such as starter"
+        )
+
+
+def _ordinal(number: int) -> str:
+    """2nd, 3rd, 4th, ..., 11th, ..., 22nd."""
+    ending = {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
+    return f"{number}{'th' if number % 100 in (11, 12, 13) else ending}"
 
 
 def _indices(clips: tuple[Clip, ...]) -> Tensor:

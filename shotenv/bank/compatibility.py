@@ -18,11 +18,16 @@ is compared by nobody.
 """
 
 
+THINNED_FIELDS = ("max_range_m",)
+"""Fields that a thinned bank's scene features were made with; a rendered bank's are made anew."""
+
+
 def check_fits(bank: Bank, sensor: SensorConfig, *, frame_rate_hz: float | None = None) -> None:
     """Refuse a sensor or a frame rate that is not the one the bank was rendered for.
 
     Fields that are applied when a frame is acquired (`shotenv.config.ACQUISITION_FIELDS`) may have
-    any value. An imported bank does not tell what it was made with, and fits everything.
+    any value; of a thinned bank all but `THINNED_FIELDS`. An imported bank does not tell what it
+    was made with, and fits everything.
 
     Parameters
     ----------
@@ -40,12 +45,19 @@ def check_fits(bank: Bank, sensor: SensorConfig, *, frame_rate_hz: float | None 
         rendered, wanted = getattr(bank.config.sensor, field), getattr(sensor, field)
         if rendered != wanted:
             raise ValueError(
-                f"sensor.{field} is {wanted:g}, but bank {bank.config.name} was rendered with "
+                f"sensor.{field} is {wanted:g}, but bank {bank.name} was rendered with "
                 f"{rendered:g}; render a bank with this sensor"
+            )
+    for field in THINNED_FIELDS if bank.is_thinned else ():
+        made_with, wanted = getattr(bank.config.sensor, field), getattr(sensor, field)
+        if made_with != wanted:
+            raise ValueError(
+                f"sensor.{field} is {wanted:g}, but scene features of bank {bank.name} were made "
+                f"with {made_with:g}; choose that, or a rendered bank such as starter"
             )
     rendered_hz = bank.config.world.frame_rate_hz
     if frame_rate_hz not in (None, rendered_hz):
         raise ValueError(
-            f"frame_rate_hz is {frame_rate_hz:g}, but bank {bank.config.name} was rendered at "
+            f"frame_rate_hz is {frame_rate_hz:g}, but bank {bank.name} was rendered at "
             f"{rendered_hz:g}; ask for that, or render a bank at this frame rate"
         )

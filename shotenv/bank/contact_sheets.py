@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from shotenv.bank.bank import Bank, Clip
+from shotenv.bank.bank import Bank, Clip, require_full
 from shotenv.bank.layout import BankError
 from shotenv.config import SensorConfig
 from shotenv.sensor import full_scale_lsb
@@ -56,14 +56,15 @@ def contact_sheet(bank: Bank, *, clips: int = CLIPS_PER_FAMILY) -> Image.Image:
     Raises
     ------
     BankError
-        An imported bank, whose frequencies nothing tells.
+        An imported bank, whose frequencies nothing tells; a thinned one, which has no pictures.
     """
+    require_full(bank, "a contact sheet")
     if bank.config is None:
         raise BankError(f"bank {bank.folder} was imported: nothing tells its frequencies")
     maps, scale = color_maps(bank.config.sensor), max(1, bank.width // NARROWEST_TILE_PX)
     title = [
         text(
-            f"{bank.manifest.name}: {len(bank)} frames of {bank.width} x {bank.height} pixels in "
+            f"{bank.name}: {len(bank)} frames of {bank.width} x {bank.height} pixels in "
             f"{len(bank.clips)} clips",
             scale * LARGE_PX,
         ),

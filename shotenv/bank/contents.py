@@ -2,19 +2,49 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from shotenv.bank.bank import Bank
 from shotenv.bank.build import bank_bytes, clips_standing, rendering_minutes
-from shotenv.bank.folders import bank_folder
-from shotenv.bank.layout import MANIFEST, frame_bytes
+from shotenv.bank.folders import SHIPPED, bank_folder
+from shotenv.bank.layout import MANIFEST, THINNED_CONTENTS, frame_bytes
+from shotenv.bank.store import read_thinned_contents
+from shotenv.bank.thinned import ThinnedBank
 from shotenv.config import BankConfig, configs_dir, read_config
 
 
 def known_banks() -> list[dict[str, Any]]:
-    """Each bank in `configs/bank/`: its size, and how much of it stands in the cache folder."""
+    """Each bank that comes along: its size, and how much of it stands.
+
+    First those that are ready, in the package; then those in `configs/bank/`, which stand in the
+    cache folder once they are rendered.
+    """
+    ready = sorted(path.parent for path in SHIPPED.glob(f"*/{THINNED_CONTENTS}"))
     paths = sorted((configs_dir() / "bank").glob("*.yaml"))
-    return [_planned(read_config(BankConfig, path)) for path in paths]
+    planned = [_planned(read_config(BankConfig, path)) for path in paths]
+    return [*(_shipped(folder) for folder in ready), *planned]
+
+
+def _shipped(folder: Path) -> dict[str, Any]:
+    """A bank that lies in the package; only its table of contents is read."""
+    about = read_thinned_contents(folder)
+    return {
+        "name": about.name,
+        "frames": sum(clip.frames for clip in about.clips),
+        "width": about.width,
+        "height": about.height,
+        "bytes": _bytes_in(folder),
+        "clips": len(about.clips),
+        "clips_standing": len(about.clips),
+        "rendered": True,
+        "minutes_left": 0.0,
+        "folder": str(folder),
+    }
+
+
+def _bytes_in(folder: Path) -> int:
+    return sum(path.stat().st_size for path in folder.iterdir())
 
 
 def _planned(config: BankConfig) -> dict[str, Any]:
@@ -63,17 +93,35 @@ def contents_of(bank: Bank) -> dict[str, Any]:
         families = splits.setdefault(clip.split, {})
         families[clip.family] = families.get(clip.family, 0) + clip.frames
     return {
-        "name": bank.manifest.name,
+        "name": bank.name,
         "folder": str(bank.folder),
         "fingerprint": bank.fingerprint,
         "frames": len(bank),
         "clips": len(bank.clips),
         "width": bank.width,
         "height": bank.height,
-        # Without headers and records, which are less than a thousandth of it.
-        "bytes": len(bank) * frame_bytes(bank.height, bank.width),
+        "bytes": _bytes_of(bank),
+        "thinned": _thinning_of(bank) if isinstance(bank, ThinnedBank) else None,
         "splits": splits,
         "config": None if bank.config is None else bank.config.model_dump(mode="json"),
+    }
+
+
+def _bytes_of(bank: Bank) -> int:
+    if bank.is_thinned:
+        return _bytes_in(bank.folder)
+    # Without headers and records, which are less than a thousandth of it.
+    return len(bank) * frame_bytes(bank.height, bank.width)
+
+
+def _thinning_of(bank: ThinnedBank) -> dict[str, Any]:
+    """What a thinned bank was made from, and the networks whose predictions it holds."""
+    about = bank.manifest
+    return {
+        "every": about.every,
+        "seed": about.seed,
+        "source": {"name": about.config.name, "fingerprint": about.source},
+        "networks": [network.model_dump() for network in about.networks],
     }
 
 
@@ -84,8 +132,20 @@ def print_contents(about: dict[str, Any]) -> None:
         f"{about['clips']} clips, {_gigabytes(about['bytes'])}"
     )
     print(f"  folder       {about['folder']}\n  fingerprint  {about['fingerprint']}")
-    print(f"  rendered     {_settings(about['config'])}\n")
+    print(f"  rendered     {_settings(about['config'])}")
+    if about["thinned"] is not None:
+        print(f"  thinned      {_told(about['thinned'])}")
+    print()
     _print_counts(about["splits"])
+
+
+def _told(thinned: dict[str, Any]) -> str:
+    every, source = thinned["every"], thinned["source"]
+    networks = [f"{one['name']} {one['fingerprint'][:16]}" for one in thinned["networks"]]
+    return (
+        f"a pixel of each {every} x {every} of {source['name']} ({source['fingerprint']}); "
+        f"predictions of {', '.join(networks)}"
+    )
 
 
 def _settings(config: dict[str, Any] | None) -> str:

@@ -16,6 +16,9 @@ RENDERING_VERSION = 4
 SOURCE = "source.json"
 """File in a bank's folder with the `identity` it is rendered from, written before any clip."""
 
+SHIPPED = Path(__file__).parents[1] / "data"
+"""Folder of the banks that come with the package."""
+
 
 def cache_dir() -> Path:
     """Folder of rendered banks and kept predictions: SHOTENV_CACHE, or the user's cache folder."""

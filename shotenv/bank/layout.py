@@ -1,8 +1,15 @@
 """What a bank consists of on disk: its arrays, the record of a clip, the table of contents.
 
+A rendered bank:
+
 <bank>/manifest.json            written last: schema, configuration, one record per clip
 <bank>/clips/<clip>/clip.json   the clip's own record, with a sha256 per array file
 <bank>/clips/<clip>/*.npy       one array per quantity, frames first (see `ARRAYS`)
+
+A thinned bank, one pixel of each few:
+
+<bank>/thinned.json             written last: schema, positions, networks, configuration, clips
+<bank>/arrays.npz               all arrays, frames first (see `THINNED_ARRAYS`)
 """
 
 from __future__ import annotations
@@ -11,7 +18,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -20,6 +27,7 @@ from shotenv.config import BankConfig, Split
 
 SCHEMA_VERSION: Final = 1
 MANIFEST, CLIPS, CLIP_RECORD = "manifest.json", "clips", "clip.json"
+THINNED_CONTENTS, THINNED_FILE = "thinned.json", "arrays.npz"
 
 
 class BankError(ValueError):
@@ -47,9 +55,18 @@ ARRAYS: Mapping[str, ArraySpec] = {
     "gray": ArraySpec("uint16", (), "LSB"),
 }
 
+THINNED_ARRAYS: Mapping[str, ArraySpec] = {
+    "correlation": ArraySpec("<f2", (8,), "active radiance of the pixel"),
+    "active": ArraySpec("<f2", (), "active_unit"),
+    "ambient": ArraySpec("<f2", (), "ambient_unit"),
+    "distance": ArraySpec("<u2", (), "mm"),
+    "gray": ArraySpec("<u2", (), "LSB"),
+}
+"""Maps of a thinned bank; what was made of its full frames comes on top."""
 
-class ClipRecord(BaseModel):
-    """What the manifest tells of a clip: where it comes from and what each frame was."""
+
+class ClipFacts(BaseModel):
+    """What a manifest tells of a clip: where it comes from and what each frame was."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -58,25 +75,37 @@ class ClipRecord(BaseModel):
     seed: int
     split: Split
     frames: int = Field(ge=1)
-    folder: str = Field(pattern=r"^clips/[A-Za-z0-9_-]{1,80}$")
     time_s: tuple[float, ...]
     ego_speed_m_s: tuple[float, ...]
     yaw_rate_rad_s: tuple[float, ...]
     gray_exposure_s: tuple[float, ...]
-    sha256: dict[str, str]
 
     @model_validator(mode="after")
-    def _complete(self) -> ClipRecord:
+    def _a_value_for_each_frame(self) -> Self:
         for field in ("time_s", "ego_speed_m_s", "yaw_rate_rad_s", "gray_exposure_s"):
             if len(getattr(self, field)) != self.frames:
                 raise ValueError(f"{field} has {len(getattr(self, field))} values; expected frames")
+        return self
+
+
+class ClipRecord(ClipFacts):
+    """A clip with a folder of its own, and the digest of each file in it."""
+
+    folder: str = Field(pattern=r"^clips/[A-Za-z0-9_-]{1,80}$")
+    sha256: dict[str, str]
+
+    @model_validator(mode="after")
+    def _a_digest_for_each_array(self) -> Self:
         if set(self.sha256) != set(ARRAYS):
             raise ValueError(f"sha256 names {sorted(self.sha256)}; expected {sorted(ARRAYS)}")
         return self
 
 
-class Manifest(BaseModel):
-    """The bank's table of contents."""
+class TableOfContents(BaseModel):
+    """What the tables of contents of all banks have.
+
+    `height` and `width` are those of the maps that the bank holds.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -84,17 +113,70 @@ class Manifest(BaseModel):
     name: str
     height: int = Field(ge=1, le=4096)
     width: int = Field(ge=1, le=4096)
-    units: dict[str, str]
     config: BankConfig | None
-    clips: tuple[ClipRecord, ...] = Field(min_length=1)
+    clips: tuple[ClipFacts, ...] = Field(min_length=1)
 
     @property
     def fingerprint(self) -> str:
         """Sixteen hexadecimal digits that change when any array of the bank changes."""
+        raise NotImplementedError
+
+
+class Manifest(TableOfContents):
+    """Table of contents of a rendered bank."""
+
+    units: dict[str, str]
+    clips: tuple[ClipRecord, ...] = Field(min_length=1)
+
+    @property
+    def fingerprint(self) -> str:
+        """See `TableOfContents.fingerprint`."""
         digest = hashlib.sha256()
         for clip in self.clips:
             digest.update(json.dumps([clip.name, sorted(clip.sha256.items())]).encode())
         return digest.hexdigest()[:16]
+
+
+class StoredNetwork(BaseModel):
+    """A network whose predictions of the full frames are in a thinned bank."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str = Field(pattern=r"^[a-z0-9_]{1,80}$")
+    fingerprint: str = Field(description="SHA-256 of its weights")
+    macs: int = Field(ge=0, description="multiply-accumulates of a full frame")
+
+    @property
+    def distances(self) -> str:
+        """Name of the array of its distances at the positions, float16 [N, H, W], metres."""
+        return f"distance_{self.name}"
+
+    @property
+    def features(self) -> str:
+        """Name of the array of the scene features, float32 [N, len(scene_features)]."""
+        return f"features_{self.name}"
+
+
+class ThinnedContents(TableOfContents):
+    """Table of contents of a thinned bank."""
+
+    config: BankConfig
+    source: str = Field(description="fingerprint of the bank that it was made from")
+    every: int = Field(ge=2, description="one pixel is drawn from each cell of so many squared")
+    seed: int = Field(ge=0, description="that the positions were drawn with")
+    rows: tuple[tuple[int, ...], ...] = Field(description="of the full frame, [H, W]")
+    columns: tuple[tuple[int, ...], ...] = Field(description="of the full frame, [H, W]")
+    scene_features: tuple[str, ...]
+    networks: tuple[StoredNetwork, ...] = Field(min_length=1)
+    # Powers of two: they round nothing.
+    active_unit: float = Field(gt=0, description="what is stored as 1, W m-2 sr-1 W-1")
+    ambient_unit: float = Field(gt=0, description="what is stored as 1, W m-2 sr-1")
+    sha256: str = Field(description="of the file of arrays")
+
+    @property
+    def fingerprint(self) -> str:
+        """See `TableOfContents.fingerprint`."""
+        return self.sha256[:16]
 
 
 def frame_bytes(height: int, width: int) -> int:

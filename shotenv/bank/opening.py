@@ -4,11 +4,31 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shotenv.bank.bank import Bank
+from shotenv.bank.bank import Bank, RenderedBank
 from shotenv.bank.build import build_bank, clips_standing
-from shotenv.bank.folders import bank_folder
-from shotenv.bank.layout import MANIFEST, BankError
+from shotenv.bank.folders import SHIPPED, bank_folder
+from shotenv.bank.layout import MANIFEST, THINNED_CONTENTS, BankError
+from shotenv.bank.thinned import ThinnedBank
 from shotenv.config import BankConfig, ConfigError, find_config, read_config
+
+
+def find_thinned(bank: str | Path) -> ThinnedBank | None:
+    """The thinned bank of that path or name, or None where there is no such one.
+
+    Raises
+    ------
+    BankError
+        It is damaged.
+    """
+    # A name is one part: SHIPPED / "/somewhere" would be somewhere.
+    folders = [Path(bank), *([SHIPPED / bank] if Path(bank).name == str(bank) else [])]
+    for folder in folders:
+        # A rendered bank in a folder of the name of a shipped one is what is meant.
+        if (folder / MANIFEST).is_file():
+            return None
+        if (folder / THINNED_CONTENTS).is_file():
+            return ThinnedBank(folder)
+    return None
 
 
 def open_bank(bank: str | Path, *, render: bool = True) -> Bank:
@@ -17,8 +37,8 @@ def open_bank(bank: str | Path, *, render: bool = True) -> Bank:
     Parameters
     ----------
     bank
-        A folder that holds a bank, or a configuration: a name in `configs/bank/` or the path of
-        a YAML file.
+        A folder that holds a bank; the name of one that comes with the package (`SHIPPED`); or a
+        configuration: a name in `configs/bank/` or the path of a YAML file.
     render
         Render a configured bank first where it does not stand yet; otherwise it is an error.
 
@@ -28,19 +48,21 @@ def open_bank(bank: str | Path, *, render: bool = True) -> Bank:
         Neither a bank nor a configuration, or a damaged bank; the message names file and cure.
     """
     # A folder first: who names a path means what lies there, not a configuration of that name.
-    if Path(bank).is_dir() and (Path(bank) / MANIFEST).is_file():
-        return Bank(Path(bank))
+    if (Path(bank) / MANIFEST).is_file():
+        return RenderedBank(Path(bank))
+    if (thinned := find_thinned(bank)) is not None:
+        return thinned
     try:
         path = find_config("bank", str(bank))
     except ConfigError as error:
         raise BankError(f"{error}, or of the folder of a bank") from None
     config = read_config(BankConfig, path)
     if render:
-        return Bank(build_bank(config))
+        return RenderedBank(build_bank(config))
     standing, clips = clips_standing(config)
     if not (bank_folder(config) / MANIFEST).is_file():
         raise BankError(
             f"bank {config.name} is not rendered yet ({standing} of {clips} clips stand); "
             f"`shotenv render --config {path}` does it"
         )
-    return Bank(bank_folder(config))
+    return RenderedBank(bank_folder(config))

@@ -19,7 +19,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from shotenv.bank.bank import Bank
+from shotenv.bank.bank import Bank, require_full
 from shotenv.bank.folders import cache_dir
 from shotenv.bank.store import sha256_of, write_array
 from unwrap.networks import Prediction, Unwrapper
@@ -30,25 +30,33 @@ SUMMARY = "kept.json"
 
 
 @dataclass(frozen=True)
-class KeptPredictions:
-    """Predictions of every frame of a bank, memory-mapped float16 [N, H, W]."""
+class PredictedDistances:
+    """Predicted distance of every frame of a bank, float16 [N, H, W], metres."""
 
     distance_m: Tensor
-    confidence: Tensor
-
-    def of(self, frames: Tensor) -> Prediction:
-        """Prediction, float32, of the bank frames `frames` [B]."""
-        return Prediction(_rows(self.distance_m, frames), _rows(self.confidence, frames))
 
     def distance_of(self, frames: Tensor) -> Tensor:
         """Predicted distance float32 [B, H, W] of the bank frames `frames` [B]."""
         return _rows(self.distance_m, frames)
 
 
+@dataclass(frozen=True)
+class KeptPredictions(PredictedDistances):
+    """Predictions of every frame of a bank, memory-mapped float16 [N, H, W]."""
+
+    confidence: Tensor
+
+    def of(self, frames: Tensor) -> Prediction:
+        """Prediction, float32, of the bank frames `frames` [B]."""
+        return Prediction(self.distance_of(frames), _rows(self.confidence, frames))
+
+
 def _rows(maps: Tensor, frames: Tensor) -> Tensor:
-    """Maps of the frames, float32. One after the other: each touches its own pages of the file."""
-    rows = [maps.narrow(0, frame, 1) for frame in frames.tolist()]
-    return (rows[0] if len(rows) == 1 else torch.cat(rows)).to(torch.float32)
+    """Maps of the frames, float32; only their own pages of the file are touched."""
+    # A single one is converted where it lies.
+    one = len(frames) == 1
+    rows = maps.narrow(0, int(frames), 1) if one else maps.index_select(0, frames)
+    return rows.to(torch.float32)
 
 
 def keep_predictions(bank: Bank, unwrapper: Unwrapper) -> KeptPredictions:
@@ -58,9 +66,12 @@ def keep_predictions(bank: Bank, unwrapper: Unwrapper) -> KeptPredictions:
 
     Raises
     ------
+    BankError
+        A thinned bank, whose images no network can read.
     OSError
         They could not be written, or not be read again.
     """
+    require_full(bank, f"the network {unwrapper.name}")
     # By content: another bank or other weights under the same name are not mistaken for these.
     name = f"{bank.fingerprint}-{unwrapper.fingerprint[:16]}"
     stride = unwrapper.stride(bank.height, bank.width)

@@ -22,10 +22,13 @@ from shotenv.bank.layout import (
     CLIP_RECORD,
     CLIPS,
     MANIFEST,
+    THINNED_CONTENTS,
+    THINNED_FILE,
     ArraySpec,
     BankError,
     ClipRecord,
     Manifest,
+    ThinnedContents,
 )
 from shotenv.config import BankConfig, one_sentence
 from unwrap.support import read_npy_header, write_json
@@ -171,15 +174,40 @@ def read_manifest(folder: Path) -> Manifest:
     return manifest
 
 
+def write_thinned_contents(folder: Path, contents: ThinnedContents) -> None:
+    """Write the table of contents of a thinned bank, with a digest of itself."""
+    content = contents.model_dump(mode="json")
+    write_json(folder / THINNED_CONTENTS, {**content, "digest": _digest_of(content)})
+
+
+def read_thinned_contents(folder: Path) -> ThinnedContents:
+    """Table of contents of the thinned bank in `folder`.
+
+    Raises
+    ------
+    BankError
+        It is not JSON, oversized, of another schema, or not as it was written.
+    """
+    path = folder / THINNED_CONTENTS
+    content = _load_json(path)
+    if content.pop("digest", None) != _digest_of(content):
+        raise BankError(f"{path} is damaged (not as it was written); {cure_for(path)}")
+    return _validated(ThinnedContents, content, path)
+
+
+def _digest_of(content: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
 def _load_json(path: Path) -> dict:
     if path.stat().st_size > LARGEST_JSON_BYTES:
         raise BankError(f"{path} is larger than {LARGEST_JSON_BYTES} bytes; refused")
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (UnicodeDecodeError, ValueError, RecursionError):
-        raise BankError(f"{path} is damaged (not JSON); {_cure(path)}") from None
+        raise BankError(f"{path} is damaged (not JSON); {cure_for(path)}") from None
     if not isinstance(content, dict):
-        raise BankError(f"{path} is damaged (not a table); {_cure(path)}")
+        raise BankError(f"{path} is damaged (not a table); {cure_for(path)}")
     return content
 
 
@@ -187,10 +215,13 @@ def _validated(model, content: dict, path: Path):
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        raise BankError(f"{path} is damaged ({one_sentence(error)}); {_cure(path)}") from None
+        raise BankError(f"{path} is damaged ({one_sentence(error)}); {cure_for(path)}") from None
 
 
-def _cure(path: Path) -> str:
+def cure_for(path: Path) -> str:
+    """What mends a bank in which the file `path` is damaged."""
+    if path.name in (THINNED_CONTENTS, THINNED_FILE):
+        return "thin the bank again, or install shotenv again where the bank is its own"
     return f"delete {path if path.name == MANIFEST else path.parent} and render the bank again"
 
 
@@ -204,12 +235,12 @@ def _check_header(path: Path, clip: ClipRecord, spec: ArraySpec, manifest: Manif
             header = read_npy_header(file)
             length = path.stat().st_size - file.tell()
     except (OSError, ValueError):
-        raise BankError(f"{path} is missing or damaged; {_cure(path)}") from None
+        raise BankError(f"{path} is missing or damaged; {cure_for(path)}") from None
     promised = (header.shape, header.fortran_order, header.dtype, length)
     if promised != (shape, False, np.dtype(spec.dtype), expected):
         raise BankError(
             f"{path} holds {header.dtype} {header.shape}, {length} bytes; expected {spec.dtype} "
-            f"{shape}, {expected} bytes; {_cure(path)}"
+            f"{shape}, {expected} bytes; {cure_for(path)}"
         )
 
 
@@ -228,6 +259,9 @@ def verify(folder: Path, *, tick: Callable[[], object] = lambda: None) -> tuple[
     BankError
         The manifest or an array's header is damaged.
     """
+    if (folder / THINNED_CONTENTS).is_file():
+        whole = sha256_of(folder / THINNED_FILE) == read_thinned_contents(folder).sha256
+        return () if whole else (THINNED_FILE,)
     damaged: list[str] = []
     for clip in read_manifest(folder).clips:
         arrays = {f"{clip.folder}/{name}.npy": digest for name, digest in clip.sha256.items()}

@@ -9,3 +9,4 @@ from .export_inputs import (
 from .sensed_frames import SensedFrames as SensedFrames
 from .signal_statistics import light_statistics as light_statistics, print_light as print_light
 from .source import bench_config as bench_config, sources as sources
+from .thinning import thin_bank as thin_bank

@@ -10,7 +10,7 @@ from typing import Any, Final
 import torch
 from torch import Tensor
 
-from shotenv.bank import Clip
+from shotenv.bank import Clip, require_full
 from shotenv.decision import Problem, acquire_depth, draw_drive, noise_of
 from unwrap.depth import Scores, evaluate, mean_scores
 from unwrap.signal import Shots
@@ -26,6 +26,7 @@ def measure_unwrapping(
     Each clip has its own laser power, integration time and noise, drawn as for a drive with the
     clip's seed. `tick` is told the number of frames after each clip.
     """
+    require_full(problem.bank, "the comparison of unwrapping methods")
     scores: dict[str, list[tuple[int, Scores]]] = {}
     for clip in problem.clips:
         found = _clip_scores(problem, clip)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from shotenv.bank import Bank, BankError, check_fits, open_bank
+from shotenv.bank import Bank, BankError, check_fits, open_bank, require_full
 from shotenv.config import EnvConfig, SensorConfig
 from shotenv.dataset.sensed_frames import SensedFrames
 from unwrap.export import ExportFrames, sample_inputs
@@ -35,7 +35,7 @@ def choose_check_bank(name: str | None, sensor: SensorConfig) -> Bank | None:
     Raises
     ------
     ValueError
-        A named bank is missing, or was rendered for another sensor.
+        A named bank is missing, thinned, or was rendered for another sensor.
     """
     if name == NO_BANK:
         return None
@@ -45,6 +45,7 @@ def choose_check_bank(name: str | None, sensor: SensorConfig) -> Bank | None:
         if name is None:
             return None
         raise
+    require_full(bank, "the check of an export")
     check_fits(bank, sensor)
     return bank
 
@@ -76,7 +77,7 @@ def bank_export_frames(
     frames = bank.frames(split)
     # Both ends and evenly between: neighbours in a clip look alike, and would check little.
     frames = frames[torch.linspace(0, len(frames) - 1, min(count, len(frames))).long()]
-    source = f"{len(frames)} {split} frames of bank {bank.manifest.name}"
+    source = f"{len(frames)} {split} frames of bank {bank.name}"
     if shots is None:
         found = _gray_frames(bank, frames, config.sensor, source)
     else:

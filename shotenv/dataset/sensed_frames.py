@@ -9,7 +9,7 @@ from typing import Literal
 import torch
 from torch import Tensor
 
-from shotenv.bank import Bank, check_fits
+from shotenv.bank import Bank, check_fits, require_full
 from shotenv.config import EnvConfig
 from shotenv.dataset.map_cache import MapCache
 from shotenv.decision import Drive, draw_drive
@@ -63,7 +63,7 @@ class SensedFrames:
     Raises
     ------
     ValueError
-        The bank was rendered for another sensor.
+        The bank was rendered for another sensor, or is thinned.
     """
 
     def __init__(
@@ -77,6 +77,7 @@ class SensedFrames:
         stride: int = 1,
         remembers: bool = False,
     ) -> None:
+        require_full(bank, "training and judging networks")
         check_fits(bank, config.sensor)
         self.bank, self.frames, self.range_m = bank, frames, range_m
         self.truth_of, self.stride, self.remembers = truth, stride, remembers

@@ -9,6 +9,7 @@ from .features import (
     FEATURE_NAMES as FEATURE_NAMES,
     FEATURES as FEATURES,
     LIMIT as LIMIT,
+    SCENE_FEATURES as SCENE_FEATURES,
     SEEN_FEATURES as SEEN_FEATURES,
     feature_index as feature_index,
     heat_margin_k as heat_margin_k,
@@ -19,6 +20,7 @@ from .observation import observe as observe
 from .outcomes import Outcomes as Outcomes, outcomes_of_all_actions as outcomes_of_all_actions
 from .problem import Problem as Problem, open_problem as open_problem
 from .rewards import TERMS as TERMS, weighted as weighted
+from .scenes import Scenes as Scenes, look_at_scenes as look_at_scenes
 from .state import State as State
 from .transition import (
     Outcome as Outcome,

@@ -12,16 +12,20 @@ from shotenv.bank import (
     Bank,
     BankError,
     Clip,
-    KeptPredictions,
+    PredictedDistances,
+    StoredNetwork,
+    ThinnedBank,
     check_fits,
+    find_thinned,
     keep_predictions,
     open_bank,
+    require_full,
 )
 from shotenv.config import TRAINING_FAMILIES, EnvConfig
-from shotenv.decision.scenes import Scenes, look_at_scenes
+from shotenv.decision.scenes import Scenes, look_at_scenes, stored_scenes
 from shotenv.laser import NetworkWork
 from shotenv.sensor import description_of
-from unwrap.networks import Unwrapper, load_unwrapper
+from unwrap.networks import Unwrapper, label_of, load_unwrapper, network_class
 from unwrap.signal import SensorDescription
 
 GRAY_NETWORK = "tofregnet"
@@ -44,8 +48,8 @@ class Problem:
     bank : Bank
     clips : tuple of Clip
         Those of the chosen split; of the families for training only where `clutter` asks for it.
-    kept : KeptPredictions
-        Predictions from the gray image of each of the bank's frames: the chosen network's, or
+    kept : PredictedDistances
+        Distances from the gray image of each of the bank's frames: the chosen network's, or
         `GRAY_NETWORK`'s where that one needs samples.
     fusion : Unwrapper or None
         The chosen network where it needs samples: it predicts in each acquisition, from what that
@@ -63,7 +67,7 @@ class Problem:
     config: EnvConfig
     bank: Bank
     clips: tuple[Clip, ...]
-    kept: KeptPredictions
+    kept: PredictedDistances
     fusion: Unwrapper | None
     scenes: Scenes
     gray_exposure_s: Tensor
@@ -92,25 +96,38 @@ def open_problem(config: EnvConfig) -> Problem:
         The bank or the network is missing or damaged, the bank was rendered for another sensor or
         frame rate, or a network that needs samples was trained for other frequencies.
     """
-    # Networks first: where one is missing, nobody should wait minutes for a bank to be rendered.
     description = description_of(config.sensor)
-    gray, fusion = load_networks(config.unwrapper, description)
-    bank = open_bank(config.bank)
-    check_fits(bank, config.sensor, frame_rate_hz=config.frame_rate_hz)
-    clips = clips_driven(bank, config)
-    kept = keep_predictions(bank, gray)
-    size = bank.height, bank.width
+    bank: Bank
+    kept: PredictedDistances
+    if (thinned := find_thinned(config.bank)) is not None:
+        bank, fusion = thinned, None
+        check_fits(bank, config.sensor, frame_rate_hz=config.frame_rate_hz)
+        clips = clips_driven(bank, config)
+        # No network is loaded: what it makes of the full frames is in the bank.
+        network = stored_network(thinned, config.unwrapper)
+        kept, scenes = thinned.predictions(network), stored_scenes(thinned, clips, network)
+        work = NetworkWork(gray=network.macs)
+    else:
+        # Networks first: where one is missing, nobody should wait minutes for a rendering.
+        gray, fusion = load_networks(config.unwrapper, description)
+        bank = open_bank(config.bank)
+        check_fits(bank, config.sensor, frame_rate_hz=config.frame_rate_hz)
+        clips = clips_driven(bank, config)
+        images = keep_predictions(bank, gray)
+        kept, scenes = images, look_at_scenes(bank, clips, images, config.sensor)
+        size = bank.height, bank.width
+        work = NetworkWork(
+            gray=gray.macs(*size), samples=0.0 if fusion is None else fusion.macs(*size)
+        )
     return Problem(
         config=config,
         bank=bank,
         clips=clips,
         kept=kept,
         fusion=fusion,
-        scenes=look_at_scenes(bank, clips, kept, config.sensor),
+        scenes=scenes,
         gray_exposure_s=torch.from_numpy(bank.gray_exposure_s),
-        network_work=NetworkWork(
-            gray=gray.macs(*size), samples=0.0 if fusion is None else fusion.macs(*size)
-        ),
+        network_work=work,
         description=description,
     )
 
@@ -134,6 +151,20 @@ def clips_driven(bank: Bank, config: EnvConfig) -> tuple[Clip, ...]:
             f"{config.split!r}, which drives leave out; set clutter to true, or choose another bank"
         )
     return driven
+
+
+def stored_network(bank: ThinnedBank, name_or_path: str) -> StoredNetwork:
+    """The network of that name or path in a thinned bank, which is not loaded.
+
+    Raises
+    ------
+    ValueError
+        The network is missing, needs samples, or the bank has no predictions of its weights.
+    """
+    label = label_of(name_or_path)
+    if network_class(label.network).needs == "samples":
+        require_full(bank, label.network)
+    return bank.network(label)
 
 
 def load_networks(

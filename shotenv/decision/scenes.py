@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from shotenv.bank import Bank, Clip, KeptPredictions
+from shotenv.bank import Bank, BankError, Clip, KeptPredictions, StoredNetwork, ThinnedBank
 from shotenv.config import SensorConfig
 from shotenv.decision.features import SCENE_FEATURES, Scene, evaluated
 from shotenv.sensor import electrons_per_radiance_second, full_scale_lsb, gray_gain_lsb_per_e
@@ -65,6 +65,29 @@ def look_at_scenes(
         )
         features[frames], log_ambient[frames] = evaluated(SCENE_FEATURES, scene), scene.log_ambient
     return Scenes(features, log_ambient)
+
+
+def stored_scenes(bank: ThinnedBank, clips: tuple[Clip, ...], network: StoredNetwork) -> Scenes:
+    """Scene features of every frame of `clips`, as they were made before the bank was thinned.
+
+    Raises
+    ------
+    BankError
+        The bank lacks a feature.
+    """
+    held = bank.manifest.scene_features
+    missing = [feature.name for feature in SCENE_FEATURES if feature.name not in held]
+    if missing:
+        raise BankError(
+            f"bank {bank.name} lacks the scene features {', '.join(missing)}; thin the bank again"
+        )
+    columns = [held.index(feature.name) for feature in SCENE_FEATURES]
+    # Rows of other splits are NaN, as in `look_at_scenes`.
+    played = torch.zeros(len(bank), 1, dtype=torch.bool)
+    for clip in clips:
+        played[clip.start : clip.start + clip.frames] = True
+    features = bank.scene_features(network)[:, columns]
+    return Scenes(features.where(played, torch.nan), bank.log_ambient.where(played, torch.nan))
 
 
 def log_ambient_of(gray: Tensor, exposure_s: Tensor, sensor: SensorConfig) -> Tensor:

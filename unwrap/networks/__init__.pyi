@@ -21,7 +21,11 @@ from .network import (
     Settings as Settings,
     autocast as autocast,
 )
-from .predictor import Unwrapper as Unwrapper, load_unwrapper as load_unwrapper
+from .predictor import (
+    Unwrapper as Unwrapper,
+    label_of as label_of,
+    load_unwrapper as load_unwrapper,
+)
 from .registry import (
     NetworkName as NetworkName,
     build_network as build_network,
@@ -35,4 +39,4 @@ from .tofsegnet import (
     class_depth_m as class_depth_m,
     wrap_classes as wrap_classes,
 )
-from .weight_files import save_weights as save_weights
+from .weight_files import WeightsLabel as WeightsLabel, save_weights as save_weights

@@ -13,7 +13,7 @@ from unwrap.networks.engines import Engines
 from unwrap.networks.network import Network, Prediction, multiply_accumulates
 from unwrap.networks.registry import PLACES
 from unwrap.networks.sizes import predict_thinned, stride_to, trained_size
-from unwrap.networks.weight_files import load_weights
+from unwrap.networks.weight_files import WeightsLabel, load_weights, read_label
 from unwrap.signal import GRAY_FULL_SCALE, Sensed, SensorDescription, unambiguous_range_m
 from unwrap.support import concatenate, mapped, torch_threads
 
@@ -163,8 +163,22 @@ def load_unwrapper(name_or_path: str | Path) -> Unwrapper:
         The file is missing, damaged or no network of this project; the message names it and the
         cure.
     """
-    shipped = str(name_or_path) in PLACES
-    path = SHIPPED / f"{name_or_path}.safetensors" if shipped else Path(name_or_path)
-    weights = load_weights(path)
+    weights = load_weights(_weights_path(name_or_path))
     network = weights.network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     return Unwrapper(weights.metadata["network"], network, weights.metadata, weights.fingerprint)
+
+
+def label_of(name_or_path: str | Path) -> WeightsLabel:
+    """Which weights `load_unwrapper` would load, without loading them.
+
+    Raises
+    ------
+    ValueError
+        The file is missing, or no network of this project.
+    """
+    return read_label(_weights_path(name_or_path))
+
+
+def _weights_path(name_or_path: str | Path) -> Path:
+    shipped = str(name_or_path) in PLACES
+    return SHIPPED / f"{name_or_path}.safetensors" if shipped else Path(name_or_path)

@@ -48,6 +48,22 @@ class Weights:
     fingerprint: str
 
 
+@dataclass(frozen=True)
+class WeightsLabel:
+    """Which weights a file says that it holds, told without reading them.
+
+    Attributes
+    ----------
+    network : str
+        Name of the network.
+    fingerprint : str
+        As in `Weights`; compared with the tensors only when they are loaded.
+    """
+
+    network: str
+    fingerprint: str
+
+
 def save_weights(path: Path, network: nn.Module, metadata: Mapping[str, Any]) -> None:
     """Write the weights of `network` and `metadata` (plain JSON values) to `path`."""
     tensors = {}
@@ -97,6 +113,22 @@ def load_weights(path: Path) -> Weights:
     except (ValueError, TypeError, KeyError, OSError, RuntimeError, SafetensorError) as error:
         reason = in_one_line(error)
         raise ValueError(f"{path}: unusable network file ({reason}); {cure}") from None
+
+
+def read_label(path: Path) -> WeightsLabel:
+    """Label of the file of weights at `path`.
+
+    Raises
+    ------
+    ValueError
+        The file is missing, no safetensors file, or no network of this project.
+    """
+    try:
+        with safe_open(path, framework="pt") as file:
+            words = dict(file.metadata() or {})
+        return WeightsLabel(words["network"], words["sha256"])
+    except (KeyError, OSError, SafetensorError) as error:
+        raise ValueError(f"{path}: unusable network file ({in_one_line(error)})") from None
 
 
 def _built(words: Mapping[str, str], tensors: Mapping[str, Tensor]) -> Weights:

@@ -14,7 +14,9 @@ from shotenv.config.reader import find_config, read_config
 
 TEXT = (Path(__file__).parents[3] / "docs" / "bank.md").read_text(encoding="utf-8")
 ROWS = dict(re.findall(r"^(\| `(\w+)` \| \d.*)$", TEXT.partition("## Banks that come")[2], re.M))
-BANKS = {bank["name"]: bank for bank in known_banks()}
+KNOWN = {bank["name"]: bank for bank in known_banks()}
+BANKS = {name: bank for name, bank in KNOWN.items() if name != "pocket"}
+"""Those that a configuration describes."""
 
 
 def row_of(name: str) -> str:
@@ -42,6 +44,13 @@ def test_every_bank_that_comes_along_has_a_row_and_no_other():
 @pytest.mark.parametrize("name", BANKS)
 def test_the_row_of_a_bank_says_what_its_configuration_gives(name):
     assert row_of(name) in ROWS
+
+
+def test_the_page_says_how_large_the_bank_is_that_ships():
+    pocket = KNOWN["pocket"]
+    size = f"{pocket['width']} x {pocket['height']} pixels (of 160 x 120)"
+    clips = f"{pocket['clips']} clips of every split, {pocket['bytes'] / 1e6:.1f} MB"
+    assert f"{pocket['frames']} frames of {size} in {clips}" in TEXT
 
 
 def test_the_families_are_as_many_as_the_page_says():

@@ -8,7 +8,7 @@ from raw_frames import RANGE_M
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
-from unwrap.networks.predictor import FRAMES_AT_ONCE, SHIPPED, load_unwrapper
+from unwrap.networks.predictor import FRAMES_AT_ONCE, SHIPPED, label_of, load_unwrapper
 from unwrap.networks.tofregnet import TofRegNet
 from unwrap.networks.tofsegnet import TofSegNet
 from unwrap.networks.weight_files import save_weights
@@ -34,6 +34,22 @@ def test_shipped_networks_are_small_and_say_what_they_are(name):
     assert unwrapper.name == name
     assert (SHIPPED / f"{name}.safetensors").stat().st_size <= 8e6
     assert unwrapper.metadata["f1_hz"] == 24e6
+
+
+def test_a_label_tells_the_weights_without_loading_them(path, monkeypatch):
+    unwrapper = load_unwrapper(path)
+    monkeypatch.setattr("unwrap.networks.predictor.load_weights", None)
+    label = label_of(path)
+    assert (label.network, label.fingerprint) == (unwrapper.name, unwrapper.fingerprint)
+
+
+@pytest.mark.parametrize("content", [None, b"no weights", b""])
+def test_a_label_of_what_is_no_network_is_refused(tmp_path, content):
+    path = tmp_path / "odd.safetensors"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(ValueError, match=r"odd\.safetensors: unusable network file"):
+        label_of(path)
 
 
 def test_prediction_is_that_of_the_network(path):

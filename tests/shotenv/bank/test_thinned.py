@@ -1,0 +1,454 @@
+"""Thinned banks: what is kept of the full frames, what is refused, and play on them."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+import shutil
+import subprocess
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from agents.cli.entry import main
+from agents.optimum.tabulation import tabulate
+from shotenv.bank import thinned as thinned_file
+from shotenv.bank.bank import require_full
+from shotenv.bank.contact_sheets import contact_sheet
+from shotenv.bank.layout import BankError
+from shotenv.bank.opening import find_thinned, open_bank
+from shotenv.bank.predictions import keep_predictions
+from shotenv.bank.store import verify
+from shotenv.bank.thinned import FARTHEST_M, ThinnedBank, decode_light, encode_light
+from shotenv.config.keywords import env_config
+from shotenv.dataset.bank_scores import measure_unwrapping
+from shotenv.dataset.export_inputs import choose_check_bank
+from shotenv.dataset.sensed_frames import SensedFrames
+from shotenv.dataset.thinning import draw_positions, thin_bank
+from shotenv.decision.acquire import acquire_depth
+from shotenv.decision.drive import draw_drive
+from shotenv.decision.features import SCENE_FEATURES
+from shotenv.decision.problem import open_problem
+from shotenv.decision.scenes import Scenes
+from shotenv.sensor.acquisition import (
+    acquire,
+    incident_light,
+    pixel_of,
+    scored_pixels,
+    sensitivity,
+)
+from shotenv.sensor.exposure import Exposure
+from unwrap.networks.predictor import load_unwrapper
+from unwrap.networks.tofregnet import TofRegNet
+from unwrap.networks.weight_files import save_weights
+from unwrap.signal import Shots, decode
+
+EVERY = 4
+
+
+@pytest.fixture(scope="module")
+def full(tiny_bank):
+    return open_bank(tiny_bank)
+
+
+@pytest.fixture(scope="module")
+def thinned(full, tiny_unwrapper, session_cache, tmp_path_factory) -> ThinnedBank:
+    folder = tmp_path_factory.mktemp("thinned") / "small"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SHOTENV_CACHE", session_cache)
+        return thin_bank(full, folder, every=EVERY, seed=3, networks=[tiny_unwrapper])
+
+
+def at_positions(maps: torch.Tensor, bank: ThinnedBank) -> torch.Tensor:
+    rows, columns = np.array(bank.manifest.rows), np.array(bank.manifest.columns)
+    return maps[..., rows, columns]
+
+
+def problems(full, thinned, tiny_kwargs, **more):
+    """The problem on the full bank and on the thinned one."""
+    kwargs = {**tiny_kwargs, **more}
+    return [open_problem(env_config(**{**kwargs, "bank": str(b.folder)})) for b in (full, thinned)]
+
+
+def test_each_cell_gives_one_pixel_drawn_by_the_seed():
+    rows, columns = draw_positions(24, 32, 4, seed=3)
+    assert rows.shape == columns.shape == (6, 8)
+    down, across = np.indices((6, 8))
+    assert (rows // 4 == down).all() and (columns // 4 == across).all()
+    assert len(np.unique(rows % 4)) == len(np.unique(columns % 4)) == 4
+    again, other = (draw_positions(24, 32, 4, seed=seed)[0] for seed in (3, 4))
+    assert (again == rows).all() and (other != rows).any()
+
+
+def test_clips_splits_and_what_is_known_of_frames_are_the_full_banks(full, thinned):
+    assert isinstance(open_bank(thinned.folder), ThinnedBank)
+    assert (thinned.height, thinned.width, thinned.every) == (6, 8, EVERY)
+    assert thinned.is_thinned and not full.is_thinned and full.every == 1
+    assert thinned.clips == full.clips and len(thinned) == len(full)
+    assert thinned.name == "small" and thinned.manifest.source == full.fingerprint
+    assert thinned.config == full.config
+    for name in ("time_s", "ego_speed_m_s", "yaw_rate_rad_s", "gray_exposure_s"):
+        np.testing.assert_array_equal(getattr(thinned, name), getattr(full, name))
+    frame = thinned.frame(5)
+    assert frame.clip == full.clip_of(5) and frame.exposure.correlation.shape == (1, 8, 6, 8)
+
+
+def test_light_is_the_full_banks_within_the_rounding_of_float16(full, thinned):
+    frames = torch.tensor([0, 7, len(full) - 1])
+    exact, kept = full.exposure(frames), thinned.exposure(frames)
+    half = 2.0**-11
+    for name in ("active", "ambient"):
+        expected = at_positions(getattr(exact, name), thinned)
+        np.testing.assert_allclose(getattr(kept, name), expected, rtol=1.01 * half)
+    correlation = at_positions(exact.correlation, thinned)
+    np.testing.assert_allclose(kept.correlation, correlation, rtol=1.01 * half, atol=1e-9)
+    truth_m, kept_m = at_positions(exact.distance_m, thinned), thinned.distance_m(frames)
+    assert torch.equal(truth_m.isinf(), kept_m.isinf()) and truth_m.isinf().any()
+    hit = truth_m.isfinite()
+    assert (truth_m[hit] - kept_m[hit]).abs().max() <= 0.51e-3
+    assert torch.equal(thinned.gray(frames), at_positions(full.gray(frames), thinned))
+    assert kept.correlation.dtype == kept_m.dtype == torch.float32
+
+
+def made_light(active: np.ndarray, seed: int = 0) -> dict[str, np.ndarray]:
+    """Light of pixels with these active radiances, [1, H, W], at random phases."""
+    phase = np.random.default_rng(seed).uniform(0, 2 * math.pi, active.shape)
+    cosines = [np.cos(phase - k * math.pi / 2) for k in range(8)]
+    return {
+        "correlation": (active[:, None] * np.stack(cosines, axis=1)).astype(np.float32),
+        "active": active.astype(np.float32),
+        "ambient": active.astype(np.float32),
+        "distance_m": np.full(active.shape, 3.0, np.float32),
+        "gray": np.zeros(active.shape, np.uint16),
+    }
+
+
+def test_nothing_underflows_eight_decades_below_the_brightest_pixel():
+    """Below 6e-5 a float16 loses its bits; the light of a night is 1e-6 and less."""
+    maps = made_light(np.geomspace(2e-7, 20.0, 400).reshape(1, 20, 20))
+    stored, units = encode_light(maps)
+    light = decode_light({n: stored[n] for n in stored if n != "gray"}, **units)
+    np.testing.assert_allclose(light.active, maps["active"], rtol=5e-4)
+    np.testing.assert_allclose(light.ambient, maps["ambient"], rtol=5e-4)
+    assert max(np.abs(stored[name]).max() for name in ("active", "ambient")) <= 2.0**15
+    assert math.log2(units["active_unit"]).is_integer()
+
+
+def test_phases_err_far_less_than_the_best_pixel_is_noisy(sensor):
+    """Best: four samples of full wells, whose shot noise alone is 1.5 mrad."""
+    maps = made_light(np.geomspace(1e-6, 20.0, 3600).reshape(1, 60, 60))
+    stored, units = encode_light(maps)
+    light = decode_light({n: stored[n] for n in stored if n != "gray"}, **units)
+    exact = decode(torch.from_numpy(maps["correlation"][0, :4])).phase_rad
+    error = decode(light.correlation[0, :4]).phase_rad - exact
+    error = (error + math.pi) % (2 * math.pi) - math.pi
+    rms = float(error.square().mean().sqrt())
+    # N electrons a sample, amplitude m N: D0 - D2 has the noise sqrt(2 N) on 2 m N.
+    electrons = 2 * sensor.full_well_e
+    best_noise_rad = 1.0 / (sensor.contrast * math.sqrt(2.0 * electrons))
+    assert rms < 0.12 * best_noise_rad
+    assert float(error.abs().max()) < 0.5 * best_noise_rad
+
+
+def test_light_on_dark_pixels_and_beyond_the_range_is_kept():
+    maps = made_light(np.array([[[0.0, 1.0, 0.5, 0.25]]]))
+    maps["distance_m"] = np.array([[[np.inf, 500.0, 0.0, 12.34567]]], np.float32)
+    stored, units = encode_light(maps)
+    light = decode_light({n: stored[n] for n in stored if n != "gray"}, **units)
+    assert (light.correlation[0, :, 0, 0] == 0).all() and light.active[0, 0, 0] == 0
+    expected = [math.inf, FARTHEST_M, 0.0, 12.346]
+    assert light.distance_m[0, 0].tolist() == pytest.approx(expected)
+
+
+def test_predictions_and_scene_features_are_those_of_the_full_frames(full, thinned, tiny_kwargs):
+    whole, small = problems(full, thinned, tiny_kwargs, split="test")
+    frames = full.frames("test")
+    predicted_m = at_positions(whole.kept.distance_of(frames), thinned)
+    assert torch.equal(small.kept.distance_of(frames), predicted_m)
+    for field in dataclasses.fields(Scenes):
+        exact, kept = getattr(whole.scenes, field.name), getattr(small.scenes, field.name)
+        assert torch.equal(kept[frames], exact[frames])
+        # NaN in other splits on both.
+        assert torch.equal(kept.isnan(), exact.isnan()) and kept.isnan().any()
+    assert small.network_work == whole.network_work
+    assert small.fusion is None and small.clips == whole.clips
+
+
+def test_two_openings_give_the_same_bits(thinned):
+    frames = torch.arange(len(thinned))
+    first = thinned.exposure(frames)
+    thinned_file._opened.cache_clear()
+    again = ThinnedBank(thinned.folder).exposure(frames)
+    for field in dataclasses.fields(Exposure):
+        assert torch.equal(getattr(first, field.name), getattr(again, field.name))
+
+
+def test_a_frame_is_acquired_as_the_full_banks_pixels_are(full, thinned, tiny_kwargs):
+    """Same offsets, same noise: samples differ by the rounding of the light alone."""
+    whole, small = problems(full, thinned, tiny_kwargs, split="test")
+    drive = draw_drive(11, small.config, small.clips, 6, 8, network=small.network_work)
+    step = torch.tensor([4])
+    noise = [torch.randn(1, 2, 6, 8, generator=torch.Generator().manual_seed(k)) for k in range(8)]
+    found = acquire_depth(small, drive, step, Shots.EIGHT, noise=noise)
+
+    exposure, sensor = whole.bank.exposure(drive.frame(step)), whole.config.sensor
+    pixels = [
+        at_positions(getattr(exposure, f.name), thinned) for f in dataclasses.fields(exposure)
+    ]
+    light = incident_light(
+        Exposure(*pixels), sensitivity(sensor, drive.laser_power_w, drive.integration_s)
+    )
+    raw = acquire(light, sensor, shots=Shots.EIGHT, noise=noise, offsets=drive.offsets)
+    apart = (found.raw.dcs_lsb - raw.dcs_lsb).abs()
+    # A word may round the other way; 2 LSB of at most 2048 are what float16 leaves of the light.
+    assert apart.max() <= 2 and (apart > 0).float().mean() < 0.3
+    read_noise_lsb = math.sqrt(2) * pixel_of(sensor).gain_lsb_per_e * sensor.read_noise_e
+    assert apart.square().mean().sqrt() < 0.5 * read_noise_lsb
+    scored = scored_pixels(light, pixels[3], sensor)
+    assert (scored != found.scored).sum() <= 1 and found.scored.any()
+    predicted_m = at_positions(whole.kept.distance_of(drive.frame(step)), thinned)
+    assert torch.equal(found.predicted_m, predicted_m)
+
+
+def test_energies_are_those_of_the_full_sensor(full, thinned, tiny_kwargs):
+    whole, small = problems(full, thinned, tiny_kwargs, split="test")
+    costs = [
+        draw_drive(5, p.config, p.clips, p.bank.height, p.bank.width, network=p.network_work)
+        for p in (whole, small)
+    ]
+    assert torch.equal(costs[0].always_eight.energy_j, costs[1].always_eight.energy_j)
+
+
+@pytest.mark.parametrize(
+    ("every", "ordinal"), [(2, "2nd"), (3, "3rd"), (8, "8th"), (12, "12th"), (21, "21st")]
+)
+def test_what_needs_neighbours_is_refused_by_name(thinned, monkeypatch, every, ordinal):
+    monkeypatch.setattr(ThinnedBank, "every", every)
+    words = f"bank small holds every {ordinal} pixel; images needs neighbours: choose a rendered"
+    with pytest.raises(BankError, match=words):
+        require_full(thinned, "images")
+
+
+def test_a_full_bank_serves_everything(full):
+    require_full(full, "images")
+
+
+def test_a_network_that_needs_samples_is_refused_at_opening(thinned, tiny_kwargs):
+    kwargs = {**tiny_kwargs, "bank": str(thinned.folder), "unwrapper": "toffusionnet"}
+    with pytest.raises(BankError, match="small holds every 4th pixel; toffusionnet needs neigh"):
+        open_problem(env_config(**kwargs))
+
+
+def test_predictions_of_other_weights_are_refused(thinned, tiny_kwargs, tmp_path, sensor):
+    path = tmp_path / "other.safetensors"
+    metadata = {"network": "tofregnet", "width": 4, "range_m": 6.0, "f1_hz": sensor.f1_hz}
+    save_weights(path, TofRegNet(width=4, range_m=6.0), metadata)
+    kwargs = {**tiny_kwargs, "bank": str(thinned.folder)}
+    own = thinned.manifest.networks[0].fingerprint[:16]
+    words = f"tofregnet here has fingerprint .*, bank small holds predictions of {own}; thin the"
+    with pytest.raises(BankError, match=words):
+        open_problem(env_config(**{**kwargs, "unwrapper": str(path)}))
+    with pytest.raises(BankError, match="holds predictions of tofregnet, not of tofsegnet"):
+        open_problem(env_config(**{**kwargs, "unwrapper": "tofsegnet"}))
+    with pytest.raises(ValueError, match=r"no-such-file.*unusable network file"):
+        open_problem(env_config(**{**kwargs, "unwrapper": "no-such-file"}))
+
+
+def test_networks_are_neither_trained_nor_checked_on_it(thinned, sensor, tiny_kwargs):
+    config = env_config(bank=str(thinned.folder))
+    with pytest.raises(BankError, match="training and judging networks needs neighbours"):
+        SensedFrames(thinned, thinned.frames("train"), config, range_m=25.0)
+    with pytest.raises(BankError, match="the check of an export needs neighbours"):
+        choose_check_bank(str(thinned.folder), sensor)
+    problem = open_problem(env_config(**tiny_kwargs).model_copy(update={"bank": config.bank}))
+    with pytest.raises(BankError, match="the comparison of unwrapping methods needs neighbours"):
+        measure_unwrapping(problem)
+    with pytest.raises(BankError, match="the network tofregnet needs neighbours"):
+        keep_predictions(thinned, load_unwrapper(tiny_kwargs["unwrapper"]))
+    with pytest.raises(BankError, match="a contact sheet needs neighbours"):
+        contact_sheet(thinned)
+
+
+def test_another_range_than_that_of_the_scene_features_is_refused(thinned, tiny_kwargs):
+    sensor = thinned.config.sensor.model_copy(update={"max_range_m": 20.0})
+    config = env_config(**{**tiny_kwargs, "bank": str(thinned.folder)})
+    words = r"sensor\.max_range_m is 20, but scene features of bank small were made with 25; choose"
+    with pytest.raises(ValueError, match=words):
+        open_problem(config.model_copy(update={"sensor": sensor}))
+
+
+def test_a_bank_without_a_feature_of_today_is_refused(thinned, tiny_kwargs, monkeypatch):
+    new = dataclasses.make_dataclass("Named", ["name"])("moonlight")
+    monkeypatch.setattr("shotenv.decision.scenes.SCENE_FEATURES", (*SCENE_FEATURES, new))
+    config = env_config(**{**tiny_kwargs, "bank": str(thinned.folder), "frames_per_drive": 31})
+    with pytest.raises(BankError, match="small lacks the scene features moonlight; thin the bank"):
+        open_problem(config)
+
+
+def test_a_thinned_bank_is_not_thinned_again(thinned, tmp_path):
+    with pytest.raises(BankError, match="small holds every 4th pixel; thinning needs"):
+        thin_bank(thinned, tmp_path / "again")
+
+
+@pytest.mark.parametrize("every", [1, 5, 7])
+def test_cells_that_do_not_fill_the_frame_are_refused(full, tmp_path, every):
+    with pytest.raises(BankError, match=f"every is {every}; expected at least 2, and a divisor"):
+        thin_bank(full, tmp_path / "odd", every=every)
+
+
+@pytest.mark.parametrize(
+    ("networks", "words"),
+    [
+        (["toffusionnet"], "toffusionnet needs samples"),
+        (["tofregnet", "tofregnet"], "expected at least one, and each name once"),
+        ([], "expected at least one"),
+    ],
+)
+def test_networks_that_cannot_be_kept_are_refused(full, tmp_path, networks, words):
+    with pytest.raises(BankError, match=words):
+        thin_bank(full, tmp_path / "odd", every=4, networks=networks)
+    assert not (tmp_path / "odd").exists()
+
+
+def test_nothing_is_overwritten(full, thinned, tiny_unwrapper):
+    with pytest.raises(BankError, match="is not empty; choose another folder"):
+        thin_bank(full, thinned.folder, every=EVERY, networks=[tiny_unwrapper])
+    assert not [path for path in thinned.folder.parent.iterdir() if path.name.startswith(".")]
+
+
+def flip_a_byte(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def rename_a_family(path):
+    path.write_text(path.read_text().replace("garage", "gerage"))
+
+
+@pytest.mark.parametrize(
+    ("name", "damage"),
+    [
+        ("arrays.npz", flip_a_byte),
+        ("arrays.npz", lambda path: path.unlink()),
+        ("arrays.npz", lambda path: path.write_bytes(b"")),
+        ("thinned.json", rename_a_family),
+        ("thinned.json", lambda path: path.write_text("{")),
+    ],
+)
+def test_damage_is_found_at_opening_by_name(thinned, tmp_path, capsys, name, damage):
+    folder = shutil.copytree(thinned.folder, tmp_path / "damaged")
+    damage(folder / name)
+    with pytest.raises(BankError, match=f"{name} is (missing or )?damaged.*; thin the bank again"):
+        open_bank(folder)
+    assert main(["bank", "verify", str(folder)]) == 1
+    assert f"{name} is " in capsys.readouterr().err
+
+
+def test_a_whole_bank_passes_verify(thinned, capsys):
+    assert verify(thinned.folder) == ()
+    assert main(["bank", "verify", str(thinned.folder)]) == 0
+    assert "every file is as it was written" in capsys.readouterr().out
+
+
+def test_thin_and_info_on_the_command_line(tiny_bank, tiny_unwrapper, tmp_path, capsys):
+    folder, about = tmp_path / "few", tmp_path / "about.json"
+    words = ["bank", "thin", tiny_bank, "--every", "8", "--out", folder, "--name", "few-pixels"]
+    assert main([str(word) for word in (*words, "--networks", tiny_unwrapper)]) == 0
+    assert main(["bank", "info", str(folder), "--json", str(about)]) == 0
+    found, out = json.loads(about.read_text()), capsys.readouterr().out
+    assert "few-pixels: 64 frames of 4 x 3 pixels in 16 clips" in out
+    assert "a pixel of each 8 x 8 of tiny" in out
+    assert found["bytes"] == sum(path.stat().st_size for path in folder.iterdir())
+    assert found["thinned"]["every"] == 8
+    assert main(["bank", "info", str(folder), "--sheet", str(tmp_path / "sheet.png")]) == 1
+    assert "a contact sheet needs neighbours" in capsys.readouterr().err
+
+
+def test_the_bank_that_ships_is_found_by_name_alone():
+    pocket = open_bank("pocket", render=False)
+    assert isinstance(pocket, ThinnedBank) and pocket.name == "pocket" and pocket.every == 8
+    assert len(pocket) >= 3000 and len(pocket.clips) >= 100
+    assert len(pocket.splits("test")) >= 25
+    for split in ("train", "validation", "test", "shift", "all"):
+        assert pocket.splits(split)
+    assert {stored.name for stored in pocket.manifest.networks} == {"tofregnet", "tofsegnet"}
+    assert sum(path.stat().st_size for path in pocket.folder.iterdir()) <= 25e6
+    assert find_thinned("starter") is None and find_thinned("/pocket") is None
+
+
+@pytest.mark.parametrize("unwrapper", ["tofregnet", "tofsegnet"])
+def test_the_bank_that_ships_fits_the_shipped_networks_and_features(unwrapper):
+    """Else it must be thinned again: docs/bank.md says how."""
+    config = env_config(bank="pocket", unwrapper=unwrapper, split="test")
+    problem = open_problem(config)
+    frames = problem.bank.frames("test")
+    assert torch.isfinite(problem.scenes.features[frames]).all()
+    assert torch.isfinite(problem.scenes.log_ambient[frames]).all()
+    distance_m = problem.kept.distance_of(frames)
+    assert distance_m.min() >= 0 and 1.0 < distance_m.mean() < 25.0
+
+
+PLAY = """
+import sys
+sys.modules["mitsuba"] = sys.modules["drjit"] = sys.modules["trimesh"] = None
+import gymnasium, shotenv
+from unwrap.networks import predictor
+def refuse(*_): raise AssertionError("a network was loaded")
+predictor.load_weights = refuse
+env = gymnasium.make("shotenv/ShotSchedule-v0", bank="pocket")
+env.reset(seed=1)
+env.action_space.seed(1)
+total = 0.0
+for _ in range(20):
+    _, reward, *_ = env.step(env.action_space.sample())
+    total += reward
+print(repr(float(total)))
+"""
+
+
+def test_the_bank_that_ships_plays_without_renderer_networks_or_cache(tmp_path):
+    cache = tmp_path / "cache"
+    environment = {**os.environ, "SHOTENV_CACHE": str(cache)}
+    found = [
+        subprocess.run(
+            [sys.executable, "-c", PLAY],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for _ in range(2)
+    ]
+    assert found[0] == found[1] and math.isfinite(float(found[0]))
+    assert not cache.exists()
+
+
+def agreement():
+    """The script docs/pocket_agreement.py."""
+    path = Path(__file__).parents[3] / "docs" / "pocket_agreement.py"
+    spec = spec_from_file_location(path.stem, path)
+    script = module_from_spec(spec)
+    spec.loader.exec_module(script)
+    return script
+
+
+def test_the_script_tells_another_problem_from_the_same(full, tiny_unwrapper):
+    script = agreement()
+    config = env_config(
+        bank=str(full.folder), unwrapper=tiny_unwrapper, split="test", frames_per_drive=16
+    )
+    problem = open_problem(config)
+    table = tabulate(problem, range(4)).table(problem.config.reward)
+    same = script.compare(table, table)
+    assert same["holds"] and len(same["choices"]) == 11 and abs(same["excess"]) < 1e-9
+    # 2 DCS as dear as 8, and the other way round.
+    other = script.compare(table, dataclasses.replace(table, cost=table.cost[..., ::-1].copy()))
+    assert not other["holds"] and ("always 2", "always 8") in other["swapped"]
+    assert other["excess"] > 0.02
