@@ -16,13 +16,11 @@ from unwrap.depth.correction import correct
 from unwrap.depth.dual import unwrap_dual
 from unwrap.depth.kernel_density import (
     KernelDensity,
-    MismatchModel,
     density_by_torch,
-    hypotheses,
-    hypotheses_by_torch,
     kernel_density,
     unwrap_kernel_density,
 )
+from unwrap.depth.mismatch import hypotheses, hypotheses_by_torch
 from unwrap.depth.reflectance import BRIGHTEST, ReflectancePrior, calibrate
 from unwrap.signal.calibrated import decode_at
 from unwrap.signal.decoding import decode
@@ -129,9 +127,9 @@ def test_compiled_vote_is_that_of_torch(amplitude, parameters):
     """The same winner but where two densities tie within 1e-5 of each other."""
     noisy = samples(steps(), amplitude, 8, SENSOR.noise_lsb, seed=7)
     first, second = (decode_at(i, noisy, SENSOR) for i in (0, 1))
-    model, count = MismatchModel.of(SENSOR, parameters), min(parameters.hypotheses, 5)
-    depth_m, weight = hypotheses(first, second, SENSOR, 1.5, parameters)
-    expected = hypotheses_by_torch(first, second, SENSOR, 1.5, model, count)
+    model, kept = parameters.mismatch_model(SENSOR), min(parameters.hypotheses, 5)
+    depth_m, weight = hypotheses(first, second, SENSOR, 1.5, model, kept)
+    expected = hypotheses_by_torch(first, second, SENSOR, 1.5, model, kept)
     same = (depth_m - expected[0]).abs() < 1e-4
     assert same.float().mean() > 0.9999  # Costs may tie, too.
     torch.testing.assert_close(weight[same], expected[1][same], rtol=1e-3, atol=1e-6)
