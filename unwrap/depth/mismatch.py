@@ -103,9 +103,12 @@ def hypotheses(
     batch, height, width = first.phase_rad.shape
     depth_m, cost = torch.empty(2, batch, kept, height, width).unbind()
     rank_candidates(
-        *map(array, maps),
+        array(first.phase_rad),
+        array(second.phase_rad),
+        array(first.amplitude),
+        array(second.amplitude),
         array_of(noise, first.phase_rad.shape),
-        MismatchModel(*map(np.float32, model)),
+        MismatchModel._make(map(np.float32, model)),
         count,
         array(depth_m),
         array(cost),
