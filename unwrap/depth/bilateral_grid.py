@@ -40,7 +40,7 @@ def small_exp(x):
     return ONE + x * (ONE + x * (E2 + x * (E3 + x * (E4 + x * (E5 + x * (E6 + x * E7))))))
 
 
-@loop
+@inlined
 def place_in_bins(
     depth_m: Array,
     bins_per_m: np.float32,
@@ -57,8 +57,10 @@ def place_in_bins(
     for j in range(len(depth_m)):
         place = depth_m[j] * bins_per_m
         middle = np.rint(place)
-        beside = place - middle
         bins[j] = np.int64(middle) - first_bin
+        rise[j] = place - middle
+    for j in range(len(depth_m)):
+        beside = rise[j]
         at_bin[j] = small_exp(-SHARPNESS * beside * beside)
         rise[j] = small_exp(TWO * SHARPNESS * beside)
         fall[j] = small_exp(-TWO * SHARPNESS * beside)
@@ -73,12 +75,13 @@ def blur_(
     right2: Array,
     left3: Array,
     right3: Array,
-    weights: Array,
+    first: np.float32,
+    second: np.float32,
+    third: np.float32,
     adds: bool,
 ) -> None:
     """`total` becomes, or gains, three weighted sums of two neighbours each; all [n]."""
     # Six at once: with more the compiler gives up proving that what is written is not read.
-    first, second, third = weights[0], weights[1], weights[2]
     if adds:
         for i in range(len(total)):
             total[i] += (
@@ -133,15 +136,17 @@ def vote_pixels(
         blurred[:] = ZERO
         for below in range(rows + reach):
             row = blurred[below % held]
-            row[:] = ZERO
-            if below < rows:
+            if below >= rows:
+                row[:] = ZERO
+            else:
                 splatted[:] = ZERO
                 for h in range(count):
                     place_in_bins(
                         depth_m[b, h, below], bins_per_m, first_bin, place, at_bin, rise, fall
                     )
+                    row_weight = weight[b, h, below]
                     for j in range(columns):
-                        own = weight[b, h, below, j]
+                        own = row_weight[j]
                         if own > ZERO:
                             start = middle + j * bins
                             splatted[start] += own
@@ -177,7 +182,9 @@ def vote_pixels(
                         splatted[middle + two : middle + two + span],
                         splatted[middle - three : middle - three + span],
                         splatted[middle + three : middle + three + span],
-                        pair_weights[t : t + 3],
+                        pair_weights[t],
+                        pair_weights[t + 1],
+                        pair_weights[t + 2],
                         t > 0,
                     )
             i = below - reach
@@ -193,11 +200,14 @@ def vote_pixels(
                     blurred[(i + t + 1) % held],
                     blurred[(i - t - 2) % held],
                     blurred[(i + t + 2) % held],
-                    pair_weights[t : t + 3],
+                    pair_weights[t],
+                    pair_weights[t + 1],
+                    pair_weights[t + 2],
                     t > 0,
                 )
             for h in range(count):
                 place_in_bins(depth_m[b, h, i], bins_per_m, first_bin, place, at_bin, rise, fall)
+                found = density[b, h, i]
                 for j in range(columns):
                     start = j * bins
                     window = votes[start + place[j] - REACH : start + place[j] + 7]
@@ -211,4 +221,4 @@ def vote_pixels(
                     beneath = down * (G1 * window[5] + down * (G2 * window[4] + beneath))
                     share = NORM * at_bin[j] * (window[6] + above + beneath)
                     # Rounding may take it beyond the whole.
-                    density[b, h, i, j] = min(share / max(votes[start], least_weight), ONE)
+                    found[j] = min(share / max(votes[start], least_weight), ONE)

@@ -168,30 +168,37 @@ def rank_candidates(
         written, the least cost first, of equals the nearest.
     """
     frames, kept, rows, columns = depth_m.shape
+    scale_m2, unsure, mismatch_m = np.empty((3, columns), np.float32)
     fused_m = np.empty((count, columns), np.float32)
     costs = np.empty((count, columns), np.float32)
     ranks = np.empty((count, columns), np.int32)
     squared1, squared2 = model.m_per_rad1 * model.m_per_rad1, model.m_per_rad2 * model.m_per_rad2
-    # Every step is a loop over a row without branches, which take many pixels at once.
+    # Loops over a row without branches take many pixels at once. They are short because the
+    # compiler gives up on loops of more than a few arrays, which might overlap.
     for b in range(frames):
         for i in range(rows):
             phase1, phase2, deviation = phase1_rad[b, i], phase2_rad[b, i], noise[b, i]
             signal1, signal2 = amplitude1[b, i], amplitude2[b, i]
+            for j in range(columns):
+                ratio1 = deviation[j] / max(signal1[j], LEAST_AMPLITUDE)
+                ratio2 = deviation[j] / max(signal2[j], LEAST_AMPLITUDE)
+                variance1, variance2 = ratio1 * ratio1 * HALF, ratio2 * ratio2 * HALF
+                variance_m2 = squared1 * variance1 + squared2 * variance2
+                scale_m2[j] = model.mismatch_scale * (variance_m2 + model.systematic_m2)
+                unsure[j] = (variance1 + variance2) / model.phase_scale_rad2
             for n in range(count):
                 wraps_m, fused, penalty = np.float32(n) * model.range1_m, fused_m[n], costs[n]
                 for j in range(columns):
                     first_m = phase1[j] * model.m_per_rad1 + wraps_m
                     gap = (first_m - phase2[j] * model.m_per_rad2) / model.range2_m
-                    mismatch_m = (gap - np.rint(gap)) * model.range2_m
-                    ratio1 = deviation[j] / max(signal1[j], LEAST_AMPLITUDE)
-                    ratio2 = deviation[j] / max(signal2[j], LEAST_AMPLITUDE)
-                    variance1, variance2 = ratio1 * ratio1 * HALF, ratio2 * ratio2 * HALF
-                    variance_m2 = squared1 * variance1 + squared2 * variance2
-                    scale_m2 = model.mismatch_scale * (variance_m2 + model.systematic_m2)
-                    unsure = (variance1 + variance2) / model.phase_scale_rad2
-                    whole = mismatch_m * mismatch_m / scale_m2 + unsure
+                    mismatch_m[j] = (gap - np.rint(gap)) * model.range2_m
+                for j in range(columns):
+                    first_m = phase1[j] * model.m_per_rad1 + wraps_m
+                    fused[j] = max(first_m - model.share2 * mismatch_m[j], ZERO)
+                for j in range(columns):
+                    first_m = phase1[j] * model.m_per_rad1 + wraps_m
+                    whole = mismatch_m[j] * mismatch_m[j] / scale_m2[j] + unsure[j]
                     penalty[j] = whole if first_m <= model.farthest_m else INFINITE
-                    fused[j] = max(first_m - model.share2 * mismatch_m, ZERO)
             # The rank of a candidate is the number of those that go before it.
             ranks[:] = 0
             for n in range(count):
@@ -203,9 +210,10 @@ def rank_candidates(
                         after[j] += np.int32(not swapped)
             for h in range(kept):
                 best_m, least = depth_m[b, h, i], cost[b, h, i]
+                place = np.int32(h)
                 best_m[:], least[:] = ZERO, INFINITE
                 for n in range(count):
                     fused, penalty, rank = fused_m[n], costs[n], ranks[n]
                     for j in range(columns):
-                        best_m[j] = fused[j] if rank[j] == h else best_m[j]
-                        least[j] = penalty[j] if rank[j] == h else least[j]
+                        best_m[j] = fused[j] if rank[j] == place else best_m[j]
+                        least[j] = penalty[j] if rank[j] == place else least[j]
