@@ -25,7 +25,7 @@ from unwrap.support import array, array_of, can_loop, loop
 
 Array = np.ndarray
 # float32, since a Python float would make the arithmetic of a loop float64.
-ZERO, HALF, INFINITE = map(np.float32, (0.0, 0.5, np.inf))
+ZERO, HALF, ONE, INFINITE = map(np.float32, (0.0, 0.5, 1.0, np.inf))
 LEAST_AMPLITUDE = np.float32(1e-6)
 """Pixels without signal count as this strong: their variance is to be large, not infinite."""
 
@@ -171,7 +171,7 @@ def rank_candidates(
     scale_m2, unsure, mismatch_m = np.empty((3, columns), np.float32)
     fused_m = np.empty((count, columns), np.float32)
     costs = np.empty((count, columns), np.float32)
-    ranks = np.empty((count, columns), np.int32)
+    ranks = np.empty((count, columns), np.float32)
     squared1, squared2 = model.m_per_rad1 * model.m_per_rad1, model.m_per_rad2 * model.m_per_rad2
     # Loops over a row without branches take many pixels at once. They are short because the
     # compiler gives up on loops of more than a few arrays, which might overlap.
@@ -200,17 +200,17 @@ def rank_candidates(
                     whole = mismatch_m[j] * mismatch_m[j] / scale_m2[j] + unsure[j]
                     penalty[j] = whole if first_m <= model.farthest_m else INFINITE
             # The rank of a candidate is the number of those that go before it.
-            ranks[:] = 0
+            ranks[:] = ZERO
             for n in range(count):
                 for m in range(n):
                     earlier, later, before, after = costs[m], costs[n], ranks[m], ranks[n]
                     for j in range(columns):
                         swapped = later[j] < earlier[j]
-                        before[j] += np.int32(swapped)
-                        after[j] += np.int32(not swapped)
+                        before[j] += ONE if swapped else ZERO
+                        after[j] += ZERO if swapped else ONE
             for h in range(kept):
                 best_m, least = depth_m[b, h, i], cost[b, h, i]
-                place = np.int32(h)
+                place = np.float32(h)
                 best_m[:], least[:] = ZERO, INFINITE
                 for n in range(count):
                     fused, penalty, rank = fused_m[n], costs[n], ranks[n]
