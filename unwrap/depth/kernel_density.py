@@ -185,7 +185,9 @@ def kernel_density(depth_m: Tensor, weight: Tensor, parameters: KernelDensity) -
         return density_by_torch(depth_m, weight, parameters)
     # One bin more below, which holds the whole weight, and one on both sides for rounding.
     first_bin = math.floor(nearest_m / bin_m) - REACH - 2
-    bins = math.ceil(farthest_m / bin_m) + REACH + 2 - first_bin
+    last_bin = math.ceil(farthest_m / bin_m) + REACH + 1
+    # In eights, so that neighbouring pixels' bins lie alike in vectors.
+    bins = 8 * math.ceil((last_bin + 1 - first_bin) / 8)
     density = torch.empty(depth_m.shape)
     vote_pixels(
         array(depth_m),

@@ -215,5 +215,7 @@ def rank_candidates(
                 for n in range(count):
                     fused, penalty, rank = fused_m[n], costs[n], ranks[n]
                     for j in range(columns):
-                        best_m[j] = fused[j] if rank[j] == place else best_m[j]
-                        least[j] = penalty[j] if rank[j] == place else least[j]
+                        other_m, this_m, other, this = best_m[j], fused[j], least[j], penalty[j]
+                        here = rank[j] == place
+                        best_m[j] = this_m if here else other_m
+                        least[j] = this if here else other
