@@ -3,6 +3,7 @@
 - `stepping`: a step of the environment, and of a vector of them, over the least it could do:
   drawing its normal numbers, and one atan2 over its pixels;
 - `sensing`: an 8-DCS frame sensed and decoded, over drawing its normal numbers;
+- `unwrapping`: the kernel-density vote of an 8-DCS frame, over its form of array operations;
 - `rendering`: a rendered frame over Mitsuba's own path integrator with as many rays;
 - `networks`: arithmetic of inference and training as a share of a large matrix product's, and what
   the public face of a network costs beside it.

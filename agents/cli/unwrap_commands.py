@@ -95,7 +95,13 @@ def compare_methods(arguments: Namespace) -> int:
 def correct_arguments(parser: ArgumentParser) -> None:
     """Which recording, of which camera, and where its depth goes."""
     parser.add_argument("input", type=Path, help=".npy, .npz, or a folder of 16-bit PNG files")
+    from unwrap.depth import Eight
+
     add_sensor_and_merge(parser)
+    ways = ", ".join(get_args(Eight))
+    parser.add_argument(
+        "--eight", type=Eight, default="two_frequency", help=f"who unwraps 8 samples: {ways}"
+    )
     parser.add_argument("--unwrapper", default="tofsegnet", help="name or path of a network")
     add_out(parser, "runs/corrected", "folder of the depth")
     parser.add_argument("--gray", type=Path, metavar="FILE", help="gray images (.npy, .npz, .png)")
@@ -125,6 +131,7 @@ def correct_files(arguments: Namespace) -> int:
         bits=sensor.adc_bits,
         unwrapper=arguments.unwrapper,
         merge=arguments.merge,
+        eight=arguments.eight,
         horizontal_fov_deg=arguments.fov_deg,
         wiggle=arguments.wiggle,
         noise_lsb=arguments.noise_lsb,

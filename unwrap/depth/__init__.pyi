@@ -3,7 +3,11 @@ from .confidence import (
     expected_calibration_error as expected_calibration_error,
     fit_temperature as fit_temperature,
 )
-from .correction import correct as correct, correct_sensed as correct_sensed
+from .correction import (
+    Eight as Eight,
+    correct as correct,
+    correct_sensed as correct_sensed,
+)
 from .dual import unwrap_dual as unwrap_dual
 from .kernel_density import unwrap_kernel_density as unwrap_kernel_density
 from .merge import (

@@ -1,18 +1,20 @@
 """Correction: raw samples and a network's prediction to unwrapped depth.
 
-Two or four samples are decoded and merged with the prediction; eight are unwrapped by their two
-frequencies, and need the prediction only where these disagree or the second is too weak to tell.
+Two or four samples are decoded and merged with the prediction. Eight are unwrapped by their two
+frequencies, pixel by pixel or by a vote of neighbours, and need the prediction only where these
+cannot tell; or the prediction decides, as with four.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from unwrap.depth.dual import unwrap_dual
+from unwrap.depth.kernel_density import unwrap_kernel_density
 from unwrap.depth.merge import RULES, Limits, Merge, merge_pixels
 from unwrap.signal import (
     FLAT,
@@ -32,6 +34,9 @@ from unwrap.signal import (
 )
 from unwrap.support import array, array_of, can_loop
 
+Eight = Literal["two_frequency", "kernel_density", "network"]
+"""Who tells the wraps of eight samples, see `correct`."""
+
 
 def correct(
     raw: RawFrame,
@@ -39,6 +44,7 @@ def correct(
     sensor: SensorDescription,
     *,
     merge: Merge = "nearest",
+    eight: Eight = "two_frequency",
     offset_lsb: Tensor | None = None,
     noise_lsb: Tensor | float | None = None,
     shift_m: Tensor | None = None,
@@ -58,6 +64,12 @@ def correct(
         nearest to it (ours); its own whole wraps (eq. 6); or no merging, for networks that refine
         the measured distance themselves. For TofSegNet, whose prediction lies within its likeliest
         class, "floor" is eq. 8, with the prediction where the sensor saturates.
+    eight : "two_frequency", "kernel_density" or "network"
+        Who tells the wraps of eight samples: the two frequencies of each pixel, and the prediction
+        where these disagree or f2 is weak; the neighbours' vote (`unwrap_kernel_density`), and the
+        prediction where the vote is not confident; or the prediction everywhere, merged with the
+        wrapped distance at f1 as of four samples. Valid is what is strong and not saturated;
+        without a prediction also agreement, or a confident vote.
     offset_lsb : float [H, W] or [B, H, W], optional
         Stored dark-offset map.
     noise_lsb : float or float [B, H, W], optional
@@ -68,8 +80,8 @@ def correct(
     Raises
     ------
     ValueError
-        Two or four samples without a prediction, an unknown merge, or samples that `decode`
-        refuses.
+        Two or four samples, or eight by "network", without a prediction, an unknown `merge` or
+        `eight`, or samples that `decode` refuses.
 
     Examples
     --------
@@ -79,13 +91,31 @@ def correct(
     >>> frame = correct(raw, torch.full((1, 1, 1), 7.0), SensorDescription())
     >>> frame.distance_m, frame.valid
     (tensor([[[6.2457]]]), tensor([[[True]]]))
+
+    Eight samples of 0 m, and the same network: it is asked only by "network".
+
+    >>> dcs = torch.tensor([100.0, 0.0, -100.0, 0.0] * 2).view(1, 8, 1, 1)
+    >>> raw, guess = RawFrame(dcs, torch.zeros(1, 1, 1).bool()), torch.full((1, 1, 1), 7.0)
+    >>> for eight in ("two_frequency", "network"):
+    ...     print(correct(raw, guess, SensorDescription(), eight=eight).distance_m)
+    tensor([[[0.]]])
+    tensor([[[6.2457]]])
     """
     if merge not in RULES:
         raise ValueError(f"merge is {merge!r}; expected one of {', '.join(RULES)}")
+    if eight not in get_args(Eight):
+        raise ValueError(f"eight is {eight!r}; expected one of {', '.join(get_args(Eight))}")
     noise = sensor.noise_lsb if noise_lsb is None else noise_lsb
     calibration = _Calibration(sensor, offset_lsb, noise, shift_m)
     if raw.shots == Shots.EIGHT:
-        return _by_two_frequencies(raw, predicted_m, calibration, merge)
+        if eight == "two_frequency":
+            return _by_two_frequencies(raw, predicted_m, calibration, merge)
+        if eight == "kernel_density":
+            return _by_vote(raw, predicted_m, calibration, merge)
+        if predicted_m is None:
+            raise ValueError("predicted_m is None; expected a prediction for eight='network'")
+        # Samples at f2 have no say; saturated are still the pixels in which any sample was.
+        raw = RawFrame(samples_at(0, raw), raw.saturated)
     if predicted_m is None:
         raise ValueError(f"predicted_m is None; {int(raw.shots)} samples cannot be unwrapped alone")
     if _can_loop(raw, predicted_m):
@@ -133,6 +163,26 @@ def _by_two_frequencies(
         return _frame(depth_m, valid & agree, first, torch.nan, sensor)
     depth_m = torch.where(agree, depth_m, _merged(first, predicted_m, sensor, merge))
     return _frame(depth_m, valid, first, predicted_m, sensor)
+
+
+def _by_vote(
+    raw: RawFrame, predicted_m: Tensor | None, calibration: _Calibration, merge: Merge
+) -> DepthFrame:
+    """Eight samples: the prediction is asked where the neighbours' vote is not confident."""
+    sensor = calibration.sensor
+    found = unwrap_kernel_density(
+        raw,
+        sensor,
+        offset_lsb=calibration.offset_lsb,
+        noise_lsb=calibration.noise_lsb,
+        shift_m=calibration.shift_m,
+    ).depth
+    first = PhaseFrame(found.phase_rad, found.amplitude, found.residual)
+    if predicted_m is None:
+        return _frame(found.distance_m, found.valid, first, torch.nan, sensor)
+    # Where the vote is not valid, either it is not confident or the guess stands in any case.
+    depth_m = torch.where(found.valid, found.distance_m, _merged(first, predicted_m, sensor, merge))
+    return _frame(depth_m, calibration.valid(first, raw), first, predicted_m, sensor)
 
 
 def _by_torch(
@@ -220,6 +270,7 @@ def correct_sensed(
     sensor: SensorDescription,
     *,
     merge: Merge = "nearest",
+    eight: Eight = "two_frequency",
 ) -> DepthFrame:
     """`correct` for frames as networks see them.
 
@@ -233,6 +284,7 @@ def correct_sensed(
         predicted_m,
         sensor,
         merge=merge,
+        eight=eight,
         offset_lsb=sensed.offset_lsb,
         noise_lsb=sensed.noise_lsb,
         shift_m=sensed.shift_m,

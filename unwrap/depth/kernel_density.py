@@ -6,33 +6,38 @@ alone often cannot tell which wrap hypothesis is right; its neighbours vote, eac
 around the distances that it thinks likely. Adapted: two frequencies instead of three, and the
 mismatch of phases is counted in its own standard deviations as the sensor's noise predicts them,
 instead of the fixed weights and the fitted noise curves of one camera.
+
+Everything stands twice, and tests hold both together: chains of torch operations, for any device
+and for gradients, which are the reference, and compiled loops, which processors use.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional
 
+from unwrap.depth.bilateral_grid import BIN_PER_KERNEL, REACH, vote_pixels
 from unwrap.depth.candidates import (
     DepthWithConfidence,
-    candidates_m,
     chosen,
     depth_with_confidence,
     require_shots,
 )
+from unwrap.depth.mismatch import MismatchModel, hypotheses
 from unwrap.signal import (
-    TWO_PI,
-    PhaseFrame,
     RawFrame,
     SensorDescription,
     Shots,
     decode_at,
-    distance_m,
-    unambiguous_range_m,
 )
+from unwrap.support import array, can_loop
+
+Array = np.ndarray
 
 
 @dataclass(frozen=True)
@@ -77,6 +82,41 @@ class KernelDensity:
     least_weight: float = 0.5
     min_confidence: float = 0.2
 
+    def __post_init__(self) -> None:
+        for name, least in (
+            ("hypotheses", 1),
+            ("radius", 0),
+            ("spread_px", 0.1),
+            ("kernel_m", 0.01),
+        ):
+            if not getattr(self, name) >= least:  # False for NaN, too.
+                raise ValueError(f"{name} is {getattr(self, name)}; expected at least {least}")
+
+    def mismatch_model(self, sensor: SensorDescription) -> MismatchModel:
+        """By which the hypotheses of a pixel are weighed."""
+        return MismatchModel.of(
+            sensor,
+            systematic_m=self.systematic_m,
+            mismatch_scale=self.mismatch_scale,
+            phase_scale_rad2=self.phase_scale_rad2,
+        )
+
+    @property
+    def line(self) -> Tensor:
+        """Weights of the neighbours along a row or a column, float32 [2 radius + 1]; sum 1."""
+        steps = torch.arange(-self.radius, self.radius + 1)
+        gauss = torch.exp(-0.5 * (steps / self.spread_px).square())
+        return gauss / gauss.sum()
+
+    @property
+    def pair_weights(self) -> Array:
+        """Of `line`, as `vote_pixels` takes it: half of the middle, the right side, zeros."""
+        right = self.line[self.radius :].numpy()
+        padded = np.zeros(-(-len(right) // 3) * 3, np.float32)
+        padded[: len(right)] = right
+        padded[0] /= 2
+        return padded
+
 
 def unwrap_kernel_density(
     raw: RawFrame,
@@ -107,7 +147,8 @@ def unwrap_kernel_density(
     first, second = (
         decode_at(i, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m) for i in (0, 1)
     )
-    depth_m, weight = _hypotheses(first, second, sensor, noise, parameters)
+    model = parameters.mismatch_model(sensor)
+    depth_m, weight = hypotheses(first, second, sensor, noise, model, parameters.hypotheses)
     confidence, winner = kernel_density(depth_m, weight, parameters).max(1)
     return depth_with_confidence(
         chosen(depth_m, winner),
@@ -118,37 +159,6 @@ def unwrap_kernel_density(
         noise_lsb=noise,
         min_confidence=parameters.min_confidence,
     )
-
-
-def _hypotheses(
-    first: PhaseFrame,
-    second: PhaseFrame,
-    sensor: SensorDescription,
-    noise: Tensor | float,
-    parameters: KernelDensity,
-) -> tuple[Tensor, Tensor]:
-    """The likeliest distances and their weights, both [B, hypotheses, H, W], likeliest first."""
-    range2_m = unambiguous_range_m(sensor.f2_hz)
-    # Each candidate of f1 with its nearest one of f2: what rounding leaves is their mismatch.
-    first_m = candidates_m(first.phase_rad, sensor.f1_hz, sensor.max_range_m)
-    gap = (first_m - distance_m(second.phase_rad, sensor.f2_hz).unsqueeze(1)) / range2_m
-    mismatch_m = (gap - gap.round()) * range2_m
-    # Four samples: the variance of the phase is (noise / A)^2 / 2. The clamp is for pixels without
-    # signal, whose variance is to be large rather than infinite.
-    variance1, variance2 = (
-        (noise / frame.amplitude.clamp(min=1e-6)).square().unsqueeze(1) / 2
-        for frame in (first, second)
-    )
-    scale1, scale2 = (unambiguous_range_m(hz) / TWO_PI for hz in (sensor.f1_hz, sensor.f2_hz))
-    variance_m2 = scale1**2 * variance1 + scale2**2 * variance2 + parameters.systematic_m**2
-    cost = mismatch_m.square() / (parameters.mismatch_scale * variance_m2)
-    unsure = (variance1 + variance2) / parameters.phase_scale_rad2
-    weight = torch.exp(-0.5 * (cost + unsure)).where(first_m <= sensor.max_range_m, 0.0)
-    # Fused by inverse variance, which goes with f^2, as in `unwrap_dual`.
-    share2 = sensor.f2_hz**2 / (sensor.f1_hz**2 + sensor.f2_hz**2)
-    fused_m = (first_m - share2 * mismatch_m).clamp(min=0)
-    weight, order = weight.topk(min(parameters.hypotheses, weight.shape[1]), dim=1)
-    return fused_m.gather(1, order), weight
 
 
 def kernel_density(depth_m: Tensor, weight: Tensor, parameters: KernelDensity) -> Tensor:
@@ -167,14 +177,39 @@ def kernel_density(depth_m: Tensor, weight: Tensor, parameters: KernelDensity) -
     float [B, I, H, W]
         0..1.
     """
+    if not can_loop(depth_m, weight):
+        return density_by_torch(depth_m, weight, parameters)
+    bin_m = BIN_PER_KERNEL * parameters.kernel_m
+    nearest_m, farthest_m = depth_m.aminmax()
+    if not math.isfinite(farthest_m - nearest_m):  # NaN has no bin.
+        return density_by_torch(depth_m, weight, parameters)
+    # One bin more below, which holds the whole weight, and one on both sides for rounding.
+    first_bin = math.floor(nearest_m / bin_m) - REACH - 2
+    last_bin = math.ceil(farthest_m / bin_m) + REACH + 1
+    # In eights, so that neighbouring pixels' bins lie alike in vectors.
+    bins = 8 * math.ceil((last_bin + 1 - first_bin) / 8)
+    density = torch.empty(depth_m.shape)
+    vote_pixels(
+        array(depth_m),
+        array(weight),
+        parameters.pair_weights,
+        np.float32(1 / bin_m),
+        first_bin,
+        bins,
+        np.float32(parameters.least_weight),
+        array(density),
+    )
+    return density
+
+
+def density_by_torch(depth_m: Tensor, weight: Tensor, parameters: KernelDensity) -> Tensor:
+    """Reference of `vote_pixels`."""
     reach = parameters.radius
     height, width = depth_m.shape[-2:]
     # Padding has weight 0: what lies outside the image does not vote.
     padded_m = functional.pad(depth_m, (reach,) * 4)
     padded_weight = functional.pad(weight, (reach,) * 4)
-    steps = torch.arange(-reach, reach + 1)
-    gauss = torch.exp(-0.5 * (steps / parameters.spread_px).square())
-    line = (gauss / gauss.sum()).tolist()
+    line = parameters.line.tolist()
     # The kernel over distances keeps the sum from being a convolution; it is a sum over shifts.
     votes, total = torch.zeros_like(depth_m), torch.zeros_like(depth_m[:, :1])
     # One shifted image after the other: all at once would take as many times the memory.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from unwrap.depth import Merge
+from unwrap.depth import Eight, Merge
 from unwrap.signal import SensorDescription, WiggleTable, read_wiggle
 
 
@@ -22,6 +22,8 @@ class Camera:
     unwrapper : str
         Name or path of a network; it is loaded where a recording has gray images.
     merge : "nearest", "floor" or "none"
+    eight : "two_frequency", "kernel_density" or "network"
+        Who tells the wraps of eight samples, see `unwrap.correct`.
     horizontal_fov_deg : float
         Horizontal field of view.
     noise_lsb : float or None
@@ -35,6 +37,7 @@ class Camera:
     merge: Merge
     horizontal_fov_deg: float
     noise_lsb: float | None = None
+    eight: Eight = "two_frequency"
 
 
 def camera_of(
@@ -46,6 +49,7 @@ def camera_of(
     horizontal_fov_deg: float,
     wiggle: Path | None = None,
     noise_lsb: float | None = None,
+    eight: Eight = "two_frequency",
 ) -> Camera:
     """Camera with a sensor like `description`, but maybe with tables and noise of its own.
 
@@ -53,7 +57,7 @@ def camera_of(
     ----------
     description : SensorDescription
         Of the kind of sensor.
-    bits, unwrapper, merge, horizontal_fov_deg
+    bits, unwrapper, merge, horizontal_fov_deg, eight
         See `Camera`.
     wiggle : Path, optional
         Tables measured with this camera, at both frequencies, in place of those of its kind.
@@ -74,7 +78,7 @@ def camera_of(
         if not 0 <= noise_lsb <= 2**bits:
             raise ValueError(f"noise_lsb is {noise_lsb:g}; expected 0 to {2**bits}")
         description = replace(description, noise_lsb=noise_lsb)
-    return Camera(description, bits, unwrapper, merge, horizontal_fov_deg, noise_lsb)
+    return Camera(description, bits, unwrapper, merge, horizontal_fov_deg, noise_lsb, eight)
 
 
 def _tables_at_both(path: Path, sensor: SensorDescription) -> tuple[WiggleTable, WiggleTable]:

@@ -52,7 +52,7 @@ def write_frames(
     Returns
     -------
     dict
-        `shots`, `merge`, and of each of the `frames` its `folder` and `frame_statistics`.
+        `shots`, `merge`, `eight`, and of each of the `frames` its `folder` and `frame_statistics`.
     """
     numbers = []
     for frame in frames:
@@ -63,7 +63,7 @@ def write_frames(
         numbers.append({"folder": str(folder), **frame_statistics(frame)})
         tick()
     shots = int(frames[0].recording.raw.shots)
-    return {"shots": shots, "merge": camera.merge, "frames": numbers}
+    return {"shots": shots, "merge": camera.merge, "eight": camera.eight, "frames": numbers}
 
 
 def encode_frame(frame: CorrectedFrame, camera: Camera) -> dict[str, bytes]:

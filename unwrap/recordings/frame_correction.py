@@ -61,6 +61,7 @@ def correct_recording(recording: Recording, camera: Camera) -> list[CorrectedFra
             None if prediction is None else prediction.distance_m,
             camera.description,
             merge=camera.merge,
+            eight=camera.eight,
             offset_lsb=one.offset_lsb,
             noise_lsb=noise.noise_lsb,
         )

@@ -14,8 +14,15 @@ from unwrap.depth.amplitude import Smoothness, min_sum, unwrap_amplitude
 from unwrap.depth.candidates import candidates_m
 from unwrap.depth.correction import correct
 from unwrap.depth.dual import unwrap_dual
-from unwrap.depth.kernel_density import KernelDensity, kernel_density, unwrap_kernel_density
+from unwrap.depth.kernel_density import (
+    KernelDensity,
+    density_by_torch,
+    kernel_density,
+    unwrap_kernel_density,
+)
+from unwrap.depth.mismatch import hypotheses, hypotheses_by_torch
 from unwrap.depth.reflectance import BRIGHTEST, ReflectancePrior, calibrate
+from unwrap.signal.calibrated import decode_at
 from unwrap.signal.decoding import decode
 from unwrap.signal.frames import RawFrame
 from unwrap.signal.sensed import Sensed, Truth
@@ -104,6 +111,50 @@ def test_kernel_density_is_that_of_a_slow_sum():
     for parameters in (KernelDensity(radius=2), KernelDensity(radius=1, kernel_m=0.2)):
         expected = slow_density(depth_m[0], weight[0], parameters)
         torch.testing.assert_close(kernel_density(depth_m, weight, parameters)[0], expected)
+
+
+PARAMETERS = (
+    KernelDensity(),
+    KernelDensity(radius=1, kernel_m=0.2),
+    KernelDensity(radius=0, hypotheses=1),
+    KernelDensity(radius=6, spread_px=4.0, hypotheses=9, kernel_m=1.3),
+)
+
+
+@pytest.mark.parametrize("parameters", PARAMETERS)
+@pytest.mark.parametrize("amplitude", [0.5, 3.0, 30.0])
+def test_compiled_vote_is_that_of_torch(amplitude, parameters):
+    """The same winner but where two densities tie within 1e-5 of each other."""
+    noisy = samples(steps(), amplitude, 8, SENSOR.noise_lsb, seed=7)
+    first, second = (decode_at(i, noisy, SENSOR) for i in (0, 1))
+    model, kept = parameters.mismatch_model(SENSOR), min(parameters.hypotheses, 5)
+    depth_m, weight = hypotheses(first, second, SENSOR, 1.5, model, kept)
+    expected = hypotheses_by_torch(first, second, SENSOR, 1.5, model, kept)
+    same = (depth_m - expected[0]).abs() < 1e-4
+    assert same.float().mean() > 0.9999  # Costs may tie, too.
+    torch.testing.assert_close(weight[same], expected[1][same], rtol=1e-3, atol=1e-6)
+    found = kernel_density(depth_m, weight, parameters)
+    reference = density_by_torch(depth_m, weight, parameters)
+    torch.testing.assert_close(found, reference, rtol=0, atol=5e-6)
+    winner = reference.gather(1, found.argmax(1, keepdim=True))[:, 0]
+    best = reference.amax(1)
+    assert (winner >= best * (1 - 1e-5)).float().mean() > 0.9999
+    assert (found.argmax(1) == reference.argmax(1)).float().mean() > 0.9995
+
+
+def test_a_frame_s_vote_does_not_depend_on_its_batch():
+    noisy = samples(steps(), 3.0, 8, SENSOR.noise_lsb, seed=7)
+    both = unwrap_kernel_density(noisy, SENSOR)
+    alone = unwrap_kernel_density(RawFrame(noisy.dcs_lsb[1:], noisy.saturated[1:]), SENSOR)
+    assert torch.equal(both.confidence[1:], alone.confidence)
+    assert torch.equal(both.depth.distance_m[1:], alone.depth.distance_m)
+
+
+def test_parameters_of_the_vote_are_checked():
+    with pytest.raises(ValueError, match="kernel_m is 0; expected at least"):
+        KernelDensity(kernel_m=0)
+    with pytest.raises(ValueError, match="hypotheses is 0; expected at least 1"):
+        KernelDensity(hypotheses=0)
 
 
 def test_saturated_and_dark_pixels_are_not_valid_but_have_a_distance():

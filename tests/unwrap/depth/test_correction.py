@@ -1,5 +1,7 @@
 """What samples and a prediction become: merge rules, validity, offset, noise, refusals."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 from raw_frames import RANGE_M, SENSOR, raw_frame
@@ -107,3 +109,60 @@ def test_sensed_frames_are_corrected_with_all_that_is_known_of_them(truth):
     assert torch.equal(found.valid, expected.valid)
     with pytest.raises(ValueError, match=r"sensed\.raw is None"):
         correct_sensed(Sensed(gray), truth.float(), SENSOR)
+
+
+EIGHT = ("two_frequency", "kernel_density", "network")
+
+
+@pytest.mark.parametrize("eight", EIGHT)
+def test_without_noise_all_ways_of_eight_samples_give_the_truth(eight):
+    truth = torch.linspace(2.0, 22.0, 20 * 30, dtype=torch.float64).reshape(1, 20, 30)
+    frame = correct(raw_frame(truth, 8), truth.float(), SENSOR, eight=eight)
+    torch.testing.assert_close(frame.distance_m, truth.float(), rtol=0, atol=2e-3)
+    assert frame.valid.all()
+
+
+def test_the_network_decides_every_wrap_of_eight_samples(truth):
+    raw, other = raw_frame(truth, 8), truth.float() + RANGE_M
+    frame = correct(raw, other, SENSOR, eight="network")
+    expected = correct(raw_frame(truth, 4), other, SENSOR)
+    assert torch.equal(frame.distance_m, expected.distance_m)
+    assert torch.equal(frame.valid, expected.valid)
+    with pytest.raises(ValueError, match="expected a prediction for eight"):
+        correct(raw, None, SENSOR, eight="network")
+
+
+def test_where_the_vote_is_not_confident_the_prediction_decides(truth):
+    # Every wrapped distance is trusted here, so that no guess stands for one near its end.
+    sensor = replace(SENSOR, saturation_range_m=7.0)
+    raw = raw_frame(truth, 8)
+    raw.dcs_lsb[:, 4:] = raw_frame(truth + 1.25, 8).dcs_lsb[:, 4:]  # Frequencies at odds.
+    raw.saturated[0, 0, 0] = True
+    alone = correct(raw, None, sensor, eight="kernel_density")
+    assert not alone.valid.any() and alone.distance_m.isnan().all()
+    guess_m = truth.float() + 0.1
+    frame = correct(raw, guess_m, sensor, eight="kernel_density")
+    assert frame.valid.sum() == truth.numel() - 1
+    assert frame.distance_m[0, 0, 0] == guess_m[0, 0, 0]
+    torch.testing.assert_close(
+        frame.distance_m[frame.valid], truth.float()[frame.valid], rtol=0, atol=2e-3
+    )
+
+
+def test_in_noise_neighbours_tell_wraps_better_than_each_pixel_alone():
+    truth = torch.linspace(10.0, 14.0, 40).expand(1, 30, 40)
+    raw = raw_frame(truth, 8, amplitude=8.0)
+    noise = torch.randn(raw.dcs_lsb.shape, generator=torch.Generator().manual_seed(5))
+    noisy = RawFrame(raw.dcs_lsb + 2.0 * noise, raw.saturated)
+    wrong = {}
+    for eight in EIGHT[:2]:
+        guess = torch.zeros_like(truth)  # Tells nothing: what is left to it is wrong.
+        found = correct(noisy, guess, SENSOR, eight=eight, noise_lsb=2.0).distance_m
+        wrong[eight] = int(((found - truth).abs() > RANGE_M / 2).sum())
+    assert wrong["two_frequency"] > 100
+    assert wrong["kernel_density"] < 0.5 * wrong["two_frequency"]
+
+
+def test_an_unknown_way_of_eight_samples_is_named(truth):
+    with pytest.raises(ValueError, match="eight is 'vote'; expected one of two_frequency"):
+        correct(raw_frame(truth, 8), truth.float(), SENSOR, eight="vote")
