@@ -28,7 +28,7 @@ class RewardConfig(Section):
     error: NonNegative = Field(1.0, description="weight of the depth error term")
     duty: NonNegative = Field(0.0, description="weight of laser duty relative to always-8")
     power: Annotated[Range, BeforeValidator(_both_ends)] = Field(
-        (0.04, 0.04),
+        (0.09, 0.09),
         description="weight of power relative to always-8, its price; (low, high) is drawn "
         "log-uniformly for each drive",
     )
@@ -57,7 +57,7 @@ class EnvConfig(Section):
 
     sensor: SensorConfig
     laser: LaserConfig
-    bank: str = Field("starter", description="name or path of a bank")
+    bank: str = Field("pocket", description="name or path of a bank")
     split: Literal[Split, "all"] = Field(
         "train", description="clips that drives are made of; all: those of no held-out family"
     )
@@ -65,15 +65,20 @@ class EnvConfig(Section):
         False, description="whether train drives also pass the clips for training networks only"
     )
     unwrapper: str = Field("tofregnet", description="name or path of an unwrapping network")
-    # The words of `unwrap.depth.Merge`, which would bring torch along; a test compares them.
+    # The words of `unwrap.depth`, which would bring torch along; a test compares them.
     merge: Literal["nearest", "floor", "none"] = Field(
         "nearest",
         description="how prediction and wrapped map merge: ours, eq. 6, or the prediction alone",
     )
+    eight: Literal["two_frequency", "kernel_density", "network"] = Field(
+        "two_frequency",
+        description="who tells the wraps of 8 samples: the two frequencies of each pixel, those of "
+        "its neighbours too (a vote), or the network",
+    )
     protect: bool = Field(
         True,
-        description="whether the sensor grants fewer shots where those asked for would trip the "
-        "laser",
+        description="whether the sensor takes fewer shots, in the end none, where those asked for "
+        "would trip the laser",
     )
     frames_per_drive: int = Field(256, ge=2, description="frames of one episode")
     frame_rate_hz: Positive = Field(10.0, description="frames per second")

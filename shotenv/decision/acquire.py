@@ -120,6 +120,7 @@ def acquire_depths(
             predicted_m,
             problem.description,
             merge=problem.config.merge,
+            eight=problem.config.eight,
             offset_lsb=offset_to_subtract_lsb(drive, shots),
             noise_lsb=noise_lsb,
             shift_m=drive.drift_m,

@@ -102,6 +102,8 @@ def open_problem(config: EnvConfig) -> Problem:
     if (thinned := find_thinned(config.bank)) is not None:
         bank, fusion = thinned, None
         check_fits(bank, config.sensor, frame_rate_hz=config.frame_rate_hz)
+        if config.eight == "kernel_density":
+            require_full(bank, f"eight={config.eight!r}")
         clips = clips_driven(bank, config)
         # No network is loaded: what it makes of the full frames is in the bank.
         network = stored_network(thinned, config.unwrapper)
