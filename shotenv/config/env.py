@@ -61,6 +61,9 @@ class EnvConfig(Section):
     split: Literal[Split, "all"] = Field(
         "train", description="clips that drives are made of; all: those of no held-out family"
     )
+    families: tuple[str, ...] = Field(
+        (), description="families of the scenes that drives pass; all of the split by default"
+    )
     clutter: bool = Field(
         False, description="whether train drives also pass the clips for training networks only"
     )

@@ -140,9 +140,18 @@ def clips_driven(bank: Bank, config: EnvConfig) -> tuple[Clip, ...]:
     Raises
     ------
     BankError
-        The bank has no clip in that split, or only those of families for training networks.
+        The bank has no clip in that split, none of the chosen families, or only those of families
+        for training networks.
     """
     clips = bank.splits(config.split)
+    if config.families:
+        known = sorted({clip.family for clip in clips})
+        if unknown := [name for name in config.families if name not in known]:
+            raise BankError(
+                f"families has {unknown[0]!r}, of which bank {bank.folder} has no clip in split "
+                f"{config.split!r}; expected some of {', '.join(known)}"
+            )
+        return tuple(clip for clip in clips if clip.family in config.families)
     if config.clutter:
         return clips
     # Schedulers are trained on drives like those that they are tested on.

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import get_args
 
 from shotenv.config.env import EnvConfig
-from unwrap.depth.merge import Eight, Merge
+from unwrap.depth.correction import Eight
+from unwrap.depth.merge import Merge
 
 
 def test_every_merge_rule_can_be_configured():
