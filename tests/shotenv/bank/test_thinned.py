@@ -6,6 +6,7 @@ import dataclasses
 import json
 import math
 import os
+import pickle
 import shutil
 import subprocess
 import sys
@@ -187,6 +188,11 @@ def test_two_openings_give_the_same_bits(thinned):
     again = ThinnedBank(thinned.folder).exposure(frames)
     for field in dataclasses.fields(Exposure):
         assert torch.equal(getattr(first, field.name), getattr(again, field.name))
+
+
+def test_another_process_opens_the_same_bank(thinned):
+    again = pickle.loads(pickle.dumps(thinned))
+    assert again.fingerprint == thinned.fingerprint and again.clips == thinned.clips
 
 
 def test_a_frame_is_acquired_as_the_full_banks_pixels_are(full, thinned, tiny_kwargs):
