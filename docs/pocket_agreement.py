@@ -54,7 +54,7 @@ def table_of(bank: str, drives: int, config: str, split: str) -> DriveTable:
     frames = drives * problem.config.frames_per_drive
     with progress(frames, f"drives of {bank}", "frame") as bar:
         possible = tabulate(problem, range(drives), tick=bar.update)
-    return possible.table(problem.config.reward)
+    return possible.table()
 
 
 def interval(values: np.ndarray) -> tuple[float, float]:

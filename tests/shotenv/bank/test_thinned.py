@@ -451,7 +451,7 @@ def test_the_script_tells_another_problem_from_the_same(full, tiny_unwrapper):
         bank=str(full.folder), unwrapper=tiny_unwrapper, split="test", frames_per_drive=16
     )
     problem = open_problem(config)
-    table = tabulate(problem, range(4)).table(problem.config.reward)
+    table = tabulate(problem, range(4)).table()
     same = script.compare(table, table)
     assert same["holds"] and len(same["choices"]) == 11 and abs(same["excess"]) < 1e-9
     # 2 DCS as dear as 8, and the other way round.
