@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 
 from agents.config import StudyConfig
+from agents.optimum import by_clip
 from agents.policies import FixedPolicy, Policy
 from shotenv.config import EnvConfig
 from shotenv.env import ShotScheduleVectorEnv
@@ -29,10 +30,13 @@ class PlayedDrives:
         Seeds of the drives.
     shots : int64 [N, T]
         Samples taken; 0 where the laser was off.
-    reward, laser_energy_j, energy_j, depth_mae_m, wrap_accuracy, temperature_k : float64 [N, T]
+    reward, laser_energy_j, energy_j, life_used_h, depth_mae_m, wrap_accuracy, temperature_k : \
+float64 [N, T]
         As in the environment's `info`; error and wrap accuracy are NaN where the laser was off.
     family : str [N, T]
         Scene family of the frame.
+    clip : int64 [N, T]
+        Number of the bank's clip that the frame is of.
     """
 
     seeds: np.ndarray
@@ -40,10 +44,12 @@ class PlayedDrives:
     reward: np.ndarray
     laser_energy_j: np.ndarray
     energy_j: np.ndarray
+    life_used_h: np.ndarray
     depth_mae_m: np.ndarray
     wrap_accuracy: np.ndarray
     temperature_k: np.ndarray
     family: np.ndarray
+    clip: np.ndarray
 
     @property
     def per_drive(self) -> dict[str, np.ndarray]:
@@ -52,10 +58,36 @@ class PlayedDrives:
             "return": self.reward.sum(axis=1),
             "laser_energy_j": self.laser_energy_j.sum(axis=1),
             "energy_j": self.energy_j.sum(axis=1),
+            "life_used_h": self.life_used_h.sum(axis=1),
             # Over frames with laser: one without has no depth. The return counts it in full.
             "depth_mae_m": np.nanmean(self.depth_mae_m, axis=1),
             "wrap_accuracy": np.nanmean(self.wrap_accuracy, axis=1),
             "tripped_share": np.mean(self.shots == 0, axis=1),
+        }
+
+    def per_clip(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Of each measure the sum over the frames of each clip, and their number, [C] each.
+
+        The ratio of both, summed over clips, is the mean over drives. Clips are what intervals
+        resample: drives that pass the same ones are no independent trials.
+        """
+        frames = self.shots.shape[1]
+        lit = self.shots > 0
+        sums = {
+            "return": frames * self.reward,
+            "laser_energy_j": frames * self.laser_energy_j,
+            "energy_j": frames * self.energy_j,
+            "life_used_h": frames * self.life_used_h,
+            "depth_mae_m": np.where(lit, self.depth_mae_m, 0.0),
+            "wrap_accuracy": np.where(lit, self.wrap_accuracy, 0.0),
+            "tripped_share": (~lit).astype(float),
+        }
+        every, with_depth = (by_clip(one.astype(float), self.clip) for one in (lit | ~lit, lit))
+        # Over frames with laser: one without has no depth. The return counts it in full.
+        of_depth = ("depth_mae_m", "wrap_accuracy")
+        return {
+            name: (by_clip(values, self.clip), with_depth if name in of_depth else every)
+            for name, values in sums.items()
         }
 
     def shots_share(self, family: str | None = None) -> list[float]:
@@ -102,6 +134,7 @@ def play_drives(
     policy.reset()
     unwrapped: Any = envs.unwrapped  # gymnasium's annotation does not know our attributes
     families = np.array(unwrapped.family_names)
+    starts = np.array([clip.start for clip in unwrapped.problem.bank.clips])
     # All drives are equally long: they end in the same step, and no frame of a next one is kept.
     frames: list[dict[str, np.ndarray]] = []
     done = np.zeros(len(seeds), dtype=bool)
@@ -119,10 +152,12 @@ def play_drives(
                 "reward": np.array(rewards, dtype=np.float64),
                 "laser_energy_j": np.array(told["laser_energy_j"]),
                 "energy_j": np.array(told["energy_j"]),
+                "life_used_h": np.array(told["life_used_h"]),
                 "depth_mae_m": np.where(off, np.nan, told["depth_mae_m"]),
                 "wrap_accuracy": np.where(off, np.nan, told["wrap_accuracy"]),
                 "temperature_k": np.array(told["temperature_k"]),
                 "family": families[told["family"]],
+                "clip": np.searchsorted(starts, told["frame"], side="right") - 1,
             }
         )
         tick(len(seeds))

@@ -33,16 +33,6 @@ class Interval:
         return {name: numbers.pop("value"), **numbers}
 
 
-def mean(values: np.ndarray, axis: int = -1) -> np.ndarray:
-    """Mean over drives."""
-    return np.mean(values, axis=axis)
-
-
-def mean_difference(a: np.ndarray, b: np.ndarray, axis: int = -1) -> np.ndarray:
-    """Mean over drives of the paired difference a - b."""
-    return np.mean(a - b, axis=axis)
-
-
 def excess(cost: np.ndarray, reference: np.ndarray, axis: int = -1) -> np.ndarray:
     """How much more `cost` is than `reference`, summed over drives: 0.15 is 15 % more."""
     return np.sum(cost, axis=axis) / np.sum(reference, axis=axis) - 1.0
@@ -95,7 +85,7 @@ def interval(
     Parameters
     ----------
     statistic : callable
-        `statistic(*samples, axis)`, such as `mean`, `mean_difference` or `excess`.
+        `statistic(*samples, axis)`, such as `ratio` or `excess`.
     samples : float [N] each
         One value per drive, or per clip; those of all samples are the same and resampled together.
     draws, confidence, seed

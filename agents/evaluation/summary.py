@@ -10,7 +10,7 @@ import numpy as np
 
 from agents.config import StudyConfig
 from agents.evaluation.play import FIXED_POLICIES, PlayedDrives
-from agents.evaluation.statistics import Interval, mean, mean_difference, study_interval
+from agents.evaluation.statistics import Interval, ratio, study_interval
 
 PACKAGES: Final = (
     "shotenv",
@@ -56,8 +56,8 @@ def summary(
         "policies": {
             name: {
                 **{
-                    measure: study_interval(mean, study, values).named("mean")
-                    for measure, values in one.per_drive.items()
+                    measure: study_interval(ratio, study, total, count).named("mean")
+                    for measure, (total, count) in one.per_clip().items()
                 },
                 "shots_share": one.shots_share(),
             }
@@ -85,9 +85,9 @@ def summary(
 
 
 def difference(one: PlayedDrives, other: PlayedDrives, study: StudyConfig) -> Interval:
-    """Mean difference of the returns, drive by drive, one minus other."""
-    returns = one.per_drive["return"], other.per_drive["return"]
-    return study_interval(mean_difference, study, *returns)
+    """Mean difference of the returns of a drive, frame by frame, one minus other."""
+    (total, count), (other_total, _) = (each.per_clip()["return"] for each in (one, other))
+    return study_interval(ratio, study, total - other_total, count)
 
 
 def drive_rows(played: Mapping[str, PlayedDrives]) -> list[dict[str, Any]]:

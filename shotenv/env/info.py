@@ -80,6 +80,7 @@ INFO_ENTRIES = (
     Entry("ambient_k", "K", "ambient temperature of this drive", lambda p: p.before.drive.ambient_k),
     Entry("power_price", "1", "weight of power in the reward of this drive", lambda p: p.before.drive.power_price),
     Entry("family", "code", "scene family of the frame, a place in `family_names`", lambda p: p.family_codes[p.before.drive.frame(p.before.step)]),
+    Entry("frame", "1", "number of the frame in the bank", lambda p: p.before.drive.frame(p.before.step)),
     Entry("temperature_k", "K", "laser temperature after the frame", lambda p: p.after.laser.temperature_k),
     Entry("eye_power_w", "W", "running average of the optical power, after the frame", lambda p: p.after.laser.eye_power_w),
     Entry("shots", "1", "samples taken; 0 without laser", lambda p: p.outcome.shots, 0),

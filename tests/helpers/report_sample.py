@@ -24,6 +24,7 @@ def made_up_results(difference=(6.0, 2.0, 9.0), f1_hz=24e6, split="test"):
             "return": made_up_interval(-60.0 - rng.random() * 20, 4.0),
             "laser_energy_j": made_up_interval(30.0 * shots, 4.0),
             "energy_j": made_up_interval(35.0 * shots, 5.0),
+            "life_used_h": made_up_interval(2e-3 * shots, 2e-4),
             "depth_mae_m": made_up_interval(1.2 / shots + 0.1, 0.02),
             "wrap_accuracy": made_up_interval(0.93, 0.01),
             "tripped_share": made_up_interval(0.01 * shots, 0.005),

@@ -127,6 +127,8 @@ def made_up_played(rewards):
         wrap_accuracy=0.9 * ones,
         temperature_k=300 * ones,
         family=np.full(shape, "garage"),
+        clip=np.broadcast_to(np.arange(shape[0])[:, None] // 2, shape),
+        life_used_h=ones,
     )
 
 

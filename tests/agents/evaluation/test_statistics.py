@@ -1,7 +1,15 @@
 import numpy as np
 import pytest
 
-from agents.evaluation.statistics import Interval, excess, interval, mean, mean_difference
+from agents.config.study_config import StudyConfig
+from agents.evaluation.statistics import Interval, excess, interval, ratio, resampled
+
+mean = np.mean
+
+
+def mean_difference(a, b, axis):
+    return np.mean(a - b, axis=axis)
+
 
 SETTINGS = {"draws": 2000, "confidence": 0.95}
 
@@ -59,3 +67,19 @@ def test_named_renames_the_point_estimate():
 def test_unusable_samples_are_refused(samples):
     with pytest.raises(ValueError, match="samples"):
         interval(mean, *samples, **SETTINGS)
+
+
+def test_a_ratio_is_resampled_with_both_of_its_parts():
+    total, count = np.array([8.0, 2.0, 5.0, 1.0]), np.array([16.0, 4.0, 10.0, 2.0])
+    # Twice as many frames and twice the sum: the mean of every resample is the same.
+    assert interval(ratio, total, count, **SETTINGS) == Interval(0.5, 0.5, 0.5)
+
+
+def test_resampled_agrees_with_the_interval_of_a_plain_mean():
+    values = np.random.default_rng(3).normal(2.0, 1.0, 60)
+    study = StudyConfig(bootstrap_draws=2000)
+    found = resampled(lambda weight: float(weight @ values / weight.sum()), 60, study)
+    usual = interval(mean, values, **SETTINGS)
+    assert found.value == pytest.approx(values.mean())
+    assert found.low == pytest.approx(usual.low, abs=0.05)
+    assert found.high == pytest.approx(usual.high, abs=0.05)
