@@ -41,10 +41,16 @@ def correct_recording(recording: Recording, camera: Camera) -> list[CorrectedFra
     Raises
     ------
     ValueError
-        There is no such network, or it was trained for another frequency.
+        There is no such network, or it was trained for another frequency; or it is to tell the
+        wraps of eight samples, and there are no gray images.
     NoUsablePixelError
         A frame without a valid pixel.
     """
+    if recording.gray is None and camera.eight == "network":
+        raise ValueError(
+            "eight is 'network' and there is no gray image; expected gray images beside the "
+            "samples, or 'two_frequency' or 'kernel_density'"
+        )
     unwrapper = None if recording.gray is None else load_unwrapper(camera.unwrapper)
     frames = []
     # One at a time: the feature maps of a long recording would not fit into memory.

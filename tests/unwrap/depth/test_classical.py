@@ -142,6 +142,18 @@ def test_compiled_vote_is_that_of_torch(amplitude, parameters):
     assert (found.argmax(1) == reference.argmax(1)).float().mean() > 0.9995
 
 
+def test_votes_that_would_be_subnormal_are_left_out():
+    # Their arithmetic takes some ten times as long, and no other vote is so small.
+    depth_m, weight = torch.full((1, 1, 9, 9), 5.0), torch.full((1, 1, 9, 9), 1e-30)
+    assert density_by_torch(depth_m, weight, KernelDensity()).amax() < 1e-28
+    assert kernel_density(depth_m, weight, KernelDensity()).amax() == 0
+    weight[0, 0, 4, 4] = 1.0
+    found, expected = (
+        f(depth_m, weight, KernelDensity()) for f in (kernel_density, density_by_torch)
+    )
+    torch.testing.assert_close(found, expected, rtol=1e-5, atol=1e-7)
+
+
 def test_a_frame_s_vote_does_not_depend_on_its_batch():
     noisy = samples(steps(), 3.0, 8, SENSOR.noise_lsb, seed=7)
     both = unwrap_kernel_density(noisy, SENSOR)

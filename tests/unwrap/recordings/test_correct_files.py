@@ -106,6 +106,32 @@ def test_few_samples_lie_in_the_wrap_nearest_to_the_prediction(
     np.testing.assert_array_equal(wraps.round(), expected)
 
 
+def test_who_tells_the_wraps_of_eight_samples_can_be_chosen(correct, tmp_path, tiny_unwrapper):
+    truth_m = wall_m(9.3)
+    np.savez(tmp_path / "wall.npz", dcs=words_of(truth_m, 8), gray=GRAY)
+    found = {}
+    for eight in ("two_frequency", "kernel_density", "network"):
+        words = ("--overwrite", "--json", tmp_path / "n.json", "--eight", eight)
+        correct(tmp_path / "wall.npz", *words)
+        found[eight] = np.load(tmp_path / "out/depth_m.npy")
+        assert json.loads((tmp_path / "n.json").read_text())["eight"] == eight
+    np.testing.assert_allclose(found["two_frequency"], truth_m, atol=2e-3)
+    np.testing.assert_allclose(found["kernel_density"], truth_m, atol=2e-3)
+    # The untrained network is wrong, and decides nevertheless.
+    predicted_m = load_unwrapper(tiny_unwrapper).predict(torch.from_numpy(GRAY)[None]).distance_m
+    expected = ((predicted_m[0].numpy() - truth_m) / UNAMBIGUOUS_M).round().clip(-1)
+    wraps = (found["network"] - truth_m) / UNAMBIGUOUS_M
+    assert (expected != 0).any()
+    assert (np.abs(wraps - expected) < 1e-3).mean() > 0.99  # Rounding decides halves.
+
+
+def test_wraps_told_by_a_network_need_a_gray_image(correct, tmp_path):
+    np.save(tmp_path / "wall.npy", words_of(wall_m(9.3), 8))
+    refused = correct(tmp_path / "wall.npy", "--eight", "network", status=1)
+    assert "eight is 'network' and there is no gray image" in refused
+    assert not (tmp_path / "out").exists()
+
+
 def test_points_lie_on_the_wall(correct, tmp_path):
     words = words_of(wall_m(4.0), 8)
     words[:, 5, 7] = 4095  # saturated: no point
