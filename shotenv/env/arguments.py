@@ -12,7 +12,7 @@ from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode
 
-from shotenv.decision import FEATURES, LIMIT, TERMS, Problem
+from shotenv.decision import FEATURES, LIMIT, TERMS
 from unwrap.signal import Shots
 
 OBSERVATIONS = ("features", "image")
@@ -89,22 +89,6 @@ def check_choice(name: str, value: Any, known: tuple[str, ...]) -> Any:
         listed = ", ".join(repr(one) for one in known)
         raise ValueError(f"{name} is {value!r}; expected one of {listed}")
     return value
-
-
-def check_every_pixel(problem: Problem, what: str) -> None:
-    """Refuse what needs neighbouring pixels where the bank has only some of them.
-
-    Raises
-    ------
-    ValueError
-        The bank is thinned.
-    """
-    every = getattr(problem.bank, "every", 1)
-    if every > 1:
-        raise ValueError(
-            f"{what} needs every pixel, and bank {str(problem.config.bank)!r} holds every "
-            f"{every}th alone; expected a rendered bank such as 'starter'"
-        )
 
 
 def spec_of_drives(spec: EnvSpec | None, frames_per_drive: int) -> EnvSpec | None:

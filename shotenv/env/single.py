@@ -10,6 +10,7 @@ import torch
 from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 
+from shotenv.bank import require_full
 from shotenv.config import env_config
 from shotenv.decision import (
     FEATURE_NAMES,
@@ -30,7 +31,6 @@ from shotenv.env.arguments import (
     RENDER_MODES,
     check_action,
     check_choice,
-    check_every_pixel,
     objective_space,
     observation_space,
     spec_of_drives,
@@ -105,9 +105,9 @@ class ShotScheduleEnv(gymnasium.Env[Any, np.int64]):
         self._outcomes = outcomes
         self.problem = open_problem(env_config(config, **fields))
         if observation == "image":
-            check_every_pixel(self.problem, 'observation="image"')
+            require_full(self.problem.bank, 'observation="image"')
         if render_mode is not None:
-            check_every_pixel(self.problem, f"render_mode={render_mode!r}")
+            require_full(self.problem.bank, f"render_mode={render_mode!r}")
         # Of this environment, where the class can only tell the usual: a film plays in real time.
         self.metadata = {**self.metadata, "render_fps": self.problem.config.frame_rate_hz}
         self.feature_names = FEATURE_NAMES

@@ -14,6 +14,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from shotenv.bank import require_full
 from shotenv.config import env_config
 from shotenv.decision import (
     FEATURE_NAMES,
@@ -35,7 +36,6 @@ from shotenv.env.arguments import (
     check_autoreset_mode,
     check_choice,
     check_count,
-    check_every_pixel,
     check_length,
     check_reset_mask,
     check_seeds,
@@ -106,9 +106,9 @@ class ShotScheduleVectorEnv(VectorEnv):
         self.problem = open_problem(env_config(config, **fields))
         check_length(max_episode_steps, self.problem.config.frames_per_drive)
         if observation == "image":
-            check_every_pixel(self.problem, 'observation="image"')
+            require_full(self.problem.bank, 'observation="image"')
         if render_mode is not None:
-            check_every_pixel(self.problem, f"render_mode={render_mode!r}")
+            require_full(self.problem.bank, f"render_mode={render_mode!r}")
         self.metadata = {
             "render_modes": list(RENDER_MODES),
             "render_fps": self.problem.config.frame_rate_hz,

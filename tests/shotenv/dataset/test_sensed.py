@@ -73,7 +73,7 @@ def test_measured_truth_agrees_with_the_rendered_where_it_is_known(bank):
     sensed, truth = measured.batch([0], draw=5, shots=Shots.EIGHT)
     _, rendered = frames_of(bank).batch([0], draw=5, shots=None)
     scored = measured.scored([0], draw=0) & truth.known
-    assert 0.3 < truth.known.float().mean() < 1
+    assert 0.2 < truth.known.float().mean() < 1
     error_m = (truth.distance_m - rendered.distance_m)[scored].abs()
     assert error_m.median() < 0.1
     # It was recorded once, whatever the draw of the samples.

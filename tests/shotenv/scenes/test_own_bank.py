@@ -96,7 +96,8 @@ def test_the_bank_plays_like_any_other(bank, tiny_unwrapper):
     )
     env.reset(seed=0)
     told = [env.step(action)[-1] for action in (0, 1, 2, 2, 1, 0)]
-    assert {info["family"] for info in told} == {"own"}
+    names = env.unwrapped.family_names
+    assert {names[info["family"]] for info in told} == {"own"}
     assert all(np.isfinite(info["depth_mae_m"]) for info in told)
     env.close()
 

@@ -85,9 +85,9 @@ def test_scores_and_features_are_those_of_the_python_loops(draw):
         score(distance_m, valid, truth_m, scored, scale_m, near_m, 25.0, into)
     assert np.allclose(*found, rtol=1e-12)
     maps, predicted_m = [draw(frames, 0.1, 50.0) for _ in range(3)], draw(frames, 0.0, 25.0)
-    sums = [np.empty((6, 2)) for _ in range(2)]
+    sums = [np.empty((8, 2)) for _ in range(2)]
     for sum_pixels, into in zip((sum_pixels_, sum_pixels_.py_func), sums, strict=True):
-        sum_pixels(*maps, valid, saturated, truth_m, predicted_m, into)
+        sum_pixels(*maps, valid, saturated, truth_m, predicted_m, truth_m, np.float32(4.0), into)
     assert np.allclose(*sums, rtol=1e-12)
 
 
