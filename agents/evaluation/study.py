@@ -102,5 +102,8 @@ def evaluate_scheduler(config: DemoConfig, scheduler: PpoPolicy) -> Evaluation:
     results = summary(played, config.study, scheduler=SCHEDULER)
     for name in RULES:
         results["policies"][name]["rule"] = str(policies[name])
+    problem = open_problem(config.env.model_copy(update={"split": config.study.split}))
+    # Every how many pixels each way: only of all of them there are images.
+    results["every"] = problem.bank.every
     results["config"] = config.model_dump(mode="json")
     return Evaluation(results, played)

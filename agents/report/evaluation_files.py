@@ -22,7 +22,8 @@ from unwrap.support import write_json
 def write_evaluation(evaluation: Evaluation, config: DemoConfig, folder: Path) -> None:
     """Write `results.json`, `drives.csv`, `timeline.json` and `frames.npz` into `folder`.
 
-    `results.json` comes last, so that a folder that has it has everything.
+    A thinned bank has no images: of it there is no `frames.npz`. `results.json` comes last, so
+    that a folder that has it has everything.
     """
     results, played = evaluation.results, evaluation.played
     scheduler = played[results["scheduler"]]
@@ -33,7 +34,8 @@ def write_evaluation(evaluation: Evaluation, config: DemoConfig, folder: Path) -
     write_json(folder / TIMELINE, timeline(compared, shown, rate_hz, laser.trip_k, laser.release_k))
     write_drives(folder / DRIVES, drive_rows(played))
     problem = open_problem(config.env.model_copy(update={"split": config.study.split}))
-    write_strip(folder / FRAMES, take_strip(problem, scheduler))
+    if results["every"] == 1:
+        write_strip(folder / FRAMES, take_strip(problem, scheduler))
     write_json(folder / RESULTS, results)
 
 

@@ -44,7 +44,7 @@ def write_report(folder: Path) -> Path:
         A file of the results is missing or damaged; the message names it.
     """
     results, played = read_json(folder / RESULTS), read_json(folder / TIMELINE)
-    strip = read_strip(folder / FRAMES)
+    strip = read_strip(folder / FRAMES) if results.get("every", 1) == 1 else None
     try:
         page = render_page(results, played, strip)
     except (KeyError, IndexError, TypeError, jinja2.UndefinedError) as error:
@@ -56,14 +56,14 @@ def write_report(folder: Path) -> Path:
     return folder / REPORT
 
 
-def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip) -> str:
-    """The page as text."""
+def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip | None) -> str:
+    """The page as text; without frames where there is no strip of them."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,
         undefined=jinja2.StrictUndefined,  # by default a misspelt name would print nothing
     )
-    panels = panels_of(strip, results["config"]["env"]["sensor"]["f1_hz"])
+    panels = panels_of(strip, results["config"]["env"]["sensor"]["f1_hz"]) if strip else {}
     scheduler, fixed = results["scheduler"], results["best_fixed"]
     # The rule is what the scheduler has to be better than to be worth its training.
     compared = tuple(name for name in (scheduler, "snr_threshold") if name in results["policies"])
@@ -74,8 +74,8 @@ def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip) -
         rows=_rows(results),
         cards=_cards(results),
         panels=[{"key": key, "title": panel.title, **panel.scale} for key, panel in panels.items()],
-        frames=json.dumps(_frames(strip, panels)),
-        families=list(dict.fromkeys(strip.family.tolist())),
+        frames=json.dumps(_frames(strip, panels)) if strip else None,
+        families=list(dict.fromkeys(strip.family.tolist())) if strip else [],
         scatter=charts.figure_html(charts.error_against_energy(results)),
         shares=charts.figure_html(charts.shares_by_family(results, compared)),
         timeline=charts.figure_html(charts.timeline(played, scheduler, fixed)),

@@ -3,7 +3,8 @@
 results.json    means and intervals of every policy, paired differences, seeds, versions
 drives.csv      one row per policy and drive
 timeline.json   one drive, frame by frame, of the scheduler and of the best fixed choice
-frames.npz      images of some of its frames: gray, wrapped map, corrected depth, truth
+frames.npz      images of some of its frames: gray, wrapped map, corrected depth, truth; none of a
+                thinned bank, which has no images
 """
 
 from __future__ import annotations
@@ -90,12 +91,14 @@ def verdict(results: dict[str, Any]) -> str:
             "includes zero."
         )
     beats = "beats" if pair["difference"] > 0 else "does worse than"
-    used_j = [results["policies"][name]["laser_energy_j"]["mean"] for name in (scheduler, fixed)]
-    change = used_j[0] / used_j[1] - 1.0
-    energy = f"{abs(change):.0%} {'less' if change < 0 else 'more'} laser energy"
+    changes = []
+    for measure, words in (("depth_mae_m", "depth error"), ("laser_energy_j", "laser energy")):
+        own, other = (results["policies"][name][measure]["mean"] for name in (scheduler, fixed))
+        change = own / other - 1.0
+        changes.append(f"{abs(change):.0%} {'less' if change < 0 else 'more'} {words}")
     return (
         f"The trained scheduler {beats} {against}, by {abs(pair['difference']):.1f} in return "
-        f"({interval}) {drives}, with {energy}."
+        f"({interval}) {drives}, with {' and '.join(changes)}."
     )
 
 

@@ -39,6 +39,7 @@ def made_up_results(difference=(6.0, 2.0, 9.0), f1_hz=24e6, split="test"):
         "paired_to_best_fixed": dict.fromkeys(NAMES, zero) | {"ppo": pair},
         "paired_to_best_rival": {"difference": 0.4, "low": -0.2, "high": 1.1},
         "best_rival": "cycle",
+        "every": 1,
         "drives": 24,
         "seeds": list(range(1000, 1024)),
         "versions": {"shotenv": "0.1.0", "torch": "2.13.0"},

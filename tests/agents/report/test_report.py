@@ -152,3 +152,13 @@ def test_a_full_disk_leaves_the_old_file(tmp_path, monkeypatch):
     with pytest.raises(OSError, match="No space left"):
         write_bytes(path, b"new")
     assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
+
+
+def test_the_page_of_a_thinned_bank_says_why_it_shows_no_frames(tmp_path):
+    results = made_up_results() | {"every": 8}
+    results["config"]["env"]["bank"] = "pocket"
+    write_json(tmp_path / RESULTS, results)
+    write_json(tmp_path / TIMELINE, made_up_timeline())
+    page = write_report(tmp_path).read_text()
+    assert "Bank pocket holds every 8th pixel and no images" in page
+    assert 'id="frames"' not in page and "const frames" not in page
