@@ -4,7 +4,7 @@ import gymnasium as gym
 
 import shotenv  # noqa: F401 - registers the environments
 
-env = gym.make("shotenv/ShotSchedule-v0", bank="starter", reward={"power": 0.04})
+env = gym.make("shotenv/ShotSchedule-v0", reward={"power": 0.09})
 observation, info = env.reset(seed=0)
 total, over = 0.0, False
 while not over:

@@ -1,0 +1,166 @@
+"""`docs/problem.md` and its picture, from what `shotenv problem --json` wrote for each preset.
+
+for preset in default hot battery night_shift paper: shotenv problem
+--env configs/env/PRESET.yaml --json DIR/PRESET.json (--goals hot for hot); then
+`python docs/problem_page.py DIR`. Needs matplotlib.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from shotenv.config import configs_dir
+
+DOCS = Path(__file__).parent
+PICTURE = DOCS / "images" / "problem.png"
+FRONTS = {
+    "clairvoyant": ("clairvoyant: knows every outcome", "#0b3d91", "-"),
+    "regression": ("foresight, told what looking showed", "#c2410c", "-"),
+    "regression_without_looking": ("foresight without looking", "#c2410c", "--"),
+    "best_blind": ("blind: drawn with fixed shares", "#64748b", "-"),
+}
+
+
+def percent(value: float) -> str:
+    """As whole percent."""
+    return f"{100 * value:.0f} %"
+
+
+def interval(one: dict[str, float], name: str, form: str) -> str:
+    """Point estimate and interval."""
+    scale = 100 if form == "%" else 1
+    digits = 0 if form == "%" else 2
+    value, low, high = (scale * one[key] for key in (name, "low", "high"))
+    return f"{value:.{digits}f} {form} ({low:.{digits}f} to {high:.{digits}f})"
+
+
+def purpose(preset: str) -> str:
+    """What the first comment of a preset says."""
+    lines = (configs_dir() / "env" / f"{preset}.yaml").read_text(encoding="utf-8").splitlines()
+    comment = []
+    for line in lines:
+        if not line.startswith("# "):
+            break
+        comment.append(line[2:])
+    return " ".join(comment)
+
+
+def goals(found: dict[str, Any]) -> str:
+    """The table of goals."""
+    rows = ["| what | measured | goal |", "|---|---|---|"]
+    for name, goal in found["goals"].items():
+        most = f" and at most {percent(goal['most'])}" if "most" in goal else ""
+        word = "" if goal["holds"] else ", missed"
+        rows.append(
+            f"| {name.replace('_', ' ')} | {100 * goal['value']:.1f} % | "
+            f"at least {percent(goal['least'])}{most}{word} |"
+        )
+    return "\n".join(rows)
+
+
+def section(preset: str, found: dict[str, Any]) -> str:
+    """Everything about one preset."""
+    optimum = found["optimum"]
+    shares = " / ".join(percent(one["mean"]) for one in optimum["shots_share"].values())
+    rows = ["| | excess over the optimum's cost | |", "|---|---|---|"]
+    rows += [
+        f"| {name.replace('_', ' ')} | {interval(one, 'excess', '%')} | {one['choice']} |"
+        for name, one in found["excess"].items()
+    ]
+    errors = [
+        "| at half of always-8's laser energy | mean error | energy for the error of blind choices |"
+    ]
+    errors += ["|---|---|---|"]
+    errors += [
+        f"| {FRONTS[name][0]} | {interval(one, 'mean', 'm')} | "
+        f"{interval(found['energy_at_equal_error'][name], 'mean', '%')} |"
+        for name, one in found["error_at_half_energy"].items()
+    ]
+    families = ["| best action by family | 2 DCS | 4 DCS | 8 DCS |", "|---|---|---|---|"]
+    families += [
+        f"| {family.replace('_', ' ')} | {' | '.join(percent(s) for s in each)} |"
+        for family, each in found["families"].items()
+    ]
+    fixed = ", ".join(f"{one['depth_mae_m']:.2f}" for one in found["fixed"].values())
+    return "\n\n".join(
+        [
+            f"## `{preset}`",
+            purpose(preset),
+            f"{found['drives']} test drives of {found['clips']} clips. The clairvoyant optimum takes 2 / 4 / 8 DCS in {shares} of "
+            f"the frames, at {percent(optimum['laser_energy_share'])} of always-8's laser energy and a mean error of "
+            f"{interval(optimum['depth_mae_m'], 'mean', 'm')}; always 2, 4, 8 DCS have {fixed} m. Heat holds back always-8 in "
+            f"{percent(found['held_back_drives_share'])} of the drives.",
+            "\n".join(rows),
+            "\n".join(errors),
+            "\n".join(families),
+            goals(found),
+        ]
+    )
+
+
+def paint(measured: dict[str, dict[str, Any]]) -> None:
+    """The fronts of each preset, error against laser energy."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(1, len(measured), figsize=(3.1 * len(measured), 3.4))
+    for axis, (preset, found) in zip(axes, measured.items(), strict=True):
+        for name, (label, color, style) in FRONTS.items():
+            points = found["fronts"][name]
+            axis.plot(
+                [100 * point["laser_energy_share"] for point in points],
+                [point["depth_mae_m"] for point in points],
+                style,
+                color=color,
+                label=label,
+                linewidth=1.6,
+            )
+        for shots, share in zip(found["fixed"], (25, 50, 100), strict=True):
+            error_m = found["fixed"][shots]["depth_mae_m"]
+            axis.plot(share, error_m, "o", color="#111827", markersize=4)
+            axis.annotate(shots, (share, error_m), textcoords="offset points", xytext=(4, 4))
+        axis.set_title(preset.replace("_", " "), fontsize=10)
+        axis.set_xlabel("laser energy, % of always 8", fontsize=9)
+        axis.set_ylim(bottom=0)
+        axis.grid(alpha=0.25)
+        axis.tick_params(labelsize=8)
+    axes[0].set_ylabel("mean depth error, m", fontsize=9)
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="lower center", ncol=4, fontsize=9, frameon=False)
+    figure.tight_layout(rect=(0, 0.08, 1, 1))
+    figure.savefig(PICTURE, dpi=110)
+
+
+HEAD = """# What there is to win
+
+Made by `python docs/problem_page.py DIR` from what `shotenv problem --env configs/env/PRESET.yaml --json DIR/PRESET.json` measures: every action in
+every frame of the test drives of the bank `pocket`, with the drive's own noise, and from these tables what policies that know everything,
+nothing, or what the sensor tells could reach. Cost is the weighted sum of the reward's terms; intervals are 95 % bootstrap intervals over clips.
+Foresight is a small network that foresees each action's error from gray image, unwrapping network and the drive's settings, trained on train drives, told what
+looking showed (how far 2 and 4 of the 8 samples of the last frame were from all of them) or not. `configs/env/strong.yaml`, which needs a rendered bank,
+is not on this page.
+
+![Mean depth error against laser energy for each preset; dots are always 2, 4 and 8 DCS](images/problem.png)
+"""
+
+
+def main() -> None:
+    """Write page and picture."""
+    folder = Path(sys.argv[1])
+    presets = ("default", "hot", "battery", "night_shift", "paper")
+    measured = {
+        preset: json.loads((folder / f"{preset}.json").read_text(encoding="utf-8"))
+        for preset in presets
+    }
+    paint(measured)
+    text = "\n\n".join([HEAD.rstrip(), *(section(*item) for item in measured.items())])
+    (DOCS / "problem.md").write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
