@@ -71,7 +71,7 @@ def section(preset: str, found: dict[str, Any]) -> str:
         for name, one in found["excess"].items()
     ]
     errors = [
-        "| at half of always-8's laser energy | mean error | energy for the error of blind choices |"
+        "| at half of always-8's energy | mean error | energy for the error of blind choices |"
     ]
     errors += ["|---|---|---|"]
     errors += [
@@ -89,10 +89,12 @@ def section(preset: str, found: dict[str, Any]) -> str:
         [
             f"## `{preset}`",
             purpose(preset),
-            f"{found['drives']} test drives of {found['clips']} clips. The clairvoyant optimum takes 2 / 4 / 8 DCS in {shares} of "
-            f"the frames, at {percent(optimum['laser_energy_share'])} of always-8's laser energy and a mean error of "
-            f"{interval(optimum['depth_mae_m'], 'mean', 'm')}; always 2, 4, 8 DCS have {fixed} m. Heat holds back always-8 in "
-            f"{percent(found['held_back_drives_share'])} of the drives.",
+            f"{found['drives']} test drives of {found['clips']} clips. The clairvoyant optimum "
+            f"takes 2 / 4 / 8 DCS in {shares} of the frames, at "
+            f"{percent(optimum['laser_energy_share'])} of always-8's laser energy and a mean error "
+            f"of {interval(optimum['depth_mae_m'], 'mean', 'm')}; always 2, 4, 8 DCS have {fixed} "
+            f"m. Heat holds back always-8 in {percent(found['held_back_drives_share'])} of the "
+            "drives.",
             "\n".join(rows),
             "\n".join(errors),
             "\n".join(families),
@@ -138,14 +140,18 @@ def paint(measured: dict[str, dict[str, Any]]) -> None:
 
 HEAD = """# What there is to win
 
-Made by `python docs/problem_page.py DIR` from what `shotenv problem --env configs/env/PRESET.yaml --json DIR/PRESET.json` measures: every action in
-every frame of the test drives of the bank `pocket`, with the drive's own noise, and from these tables what policies that know everything,
-nothing, or what the sensor tells could reach. Cost is the weighted sum of the reward's terms; intervals are 95 % bootstrap intervals over clips.
-Foresight is a small network that foresees each action's error from gray image, unwrapping network and the drive's settings, trained on train drives, told what
-looking showed (how far 2 and 4 of the 8 samples of the last frame were from all of them) or not. `configs/env/strong.yaml`, which needs a rendered bank,
-is not on this page.
+Made by `python docs/problem_page.py DIR` from what
+`shotenv problem --env configs/env/PRESET.yaml --json DIR/PRESET.json` measures: every action in
+every frame of the test drives of the bank `pocket`, with the drive's own noise, and from these
+tables what policies that know everything, nothing, or what the sensor tells could reach. Cost is
+the weighted sum of the reward's terms; intervals are 95 % bootstrap intervals over clips. Foresight
+is a small network that foresees each action's error from gray image, unwrapping network and the
+drive's settings, trained on train drives, told what looking showed (how far 2 and 4 of the 8
+samples of the last frame were from all of them) or not. The goals are those of the default problem,
+or for `hot` of one in which heat binds; the other presets are what they are for and need not meet
+them. `configs/env/strong.yaml`, which needs a rendered bank, is not on this page.
 
-![Mean depth error against laser energy for each preset; dots are always 2, 4 and 8 DCS](images/problem.png)
+![Error against laser energy by preset; dots are always 2, 4 and 8 DCS](images/problem.png)
 """
 
 

@@ -30,15 +30,10 @@ WITH_EXAMPLES = sorted(
 
 
 @pytest.fixture
-def small_env(monkeypatch, tiny_bank, tiny_unwrapper):
-    """`gymnasium.make` with a bank that needs no rendering, and short drives."""
-    make, small = gymnasium.make, {"unwrapper": tiny_unwrapper, "frames_per_drive": 3}
-
-    def make_small(name, **chosen):
-        assert chosen.pop("bank") == "starter"
-        return make(name, bank=tiny_bank, **small, **chosen)
-
-    monkeypatch.setattr(gymnasium, "make", make_small)
+def small_env(monkeypatch):
+    """`gymnasium.make` with short drives."""
+    make = gymnasium.make
+    monkeypatch.setattr(gymnasium, "make", lambda *a, **k: make(*a, frames_per_drive=3, **k))
 
 
 def code_with(word: str) -> str:
