@@ -167,11 +167,18 @@ class ThinnedContents(TableOfContents):
     rows: tuple[tuple[int, ...], ...] = Field(description="of the full frame, [H, W]")
     columns: tuple[tuple[int, ...], ...] = Field(description="of the full frame, [H, W]")
     scene_features: tuple[str, ...]
+    probe: tuple[float, ...] = Field(description="their values on a made-up frame, by formula")
     networks: tuple[StoredNetwork, ...] = Field(min_length=1)
     # Powers of two: they round nothing.
     active_unit: float = Field(gt=0, description="what is stored as 1, W m-2 sr-1 W-1")
     ambient_unit: float = Field(gt=0, description="what is stored as 1, W m-2 sr-1")
     sha256: str = Field(description="of the file of arrays")
+
+    @model_validator(mode="after")
+    def _a_probe_of_each_feature(self) -> Self:
+        if len(self.probe) != len(self.scene_features):
+            raise ValueError(f"probe has {len(self.probe)} values; expected one per scene feature")
+        return self
 
     @property
     def fingerprint(self) -> str:

@@ -21,7 +21,7 @@ from shotenv.bank import (
     require_full,
     write_thinned,
 )
-from shotenv.decision import SCENE_FEATURES, look_at_scenes
+from shotenv.decision import look_at_scenes, probe_features
 from unwrap.networks import Unwrapper, load_unwrapper
 
 GRAY_NETWORKS = ("tofregnet", "tofsegnet")
@@ -96,6 +96,7 @@ def thin_bank(
         arrays[network.features] = scenes.features.numpy()
         arrays[LOG_AMBIENT] = scenes.log_ambient.numpy()
     light, units = encode_light(maps_at(bank, rows, columns, tick=tick))
+    probe = probe_features(sensor)
     contents = {
         "name": name or folder.resolve().name,
         "height": rows.shape[0],
@@ -106,7 +107,8 @@ def thin_bank(
         "seed": seed,
         "rows": rows.tolist(),
         "columns": columns.tolist(),
-        "scene_features": [feature.name for feature in SCENE_FEATURES],
+        "scene_features": list(probe),
+        "probe": list(probe.values()),
         "networks": [network.model_dump() for network in stored],
         "clips": [
             clip.model_dump(mode="json", include=set(ClipFacts.model_fields))

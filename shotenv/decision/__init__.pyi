@@ -20,7 +20,11 @@ from .observation import observe as observe
 from .outcomes import Outcomes as Outcomes, outcomes_of_all_actions as outcomes_of_all_actions
 from .problem import Problem as Problem, open_problem as open_problem
 from .rewards import TERMS as TERMS, weighted as weighted
-from .scenes import Scenes as Scenes, look_at_scenes as look_at_scenes
+from .scenes import (
+    Scenes as Scenes,
+    look_at_scenes as look_at_scenes,
+    probe_features as probe_features,
+)
 from .state import State as State
 from .transition import (
     Outcome as Outcome,

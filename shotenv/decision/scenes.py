@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isclose
 
 import torch
 from torch import Tensor
@@ -73,13 +74,22 @@ def stored_scenes(bank: ThinnedBank, clips: tuple[Clip, ...], network: StoredNet
     Raises
     ------
     BankError
-        The bank lacks a feature.
+        The bank lacks a feature, or has one of another formula.
     """
     held = bank.manifest.scene_features
     missing = [feature.name for feature in SCENE_FEATURES if feature.name not in held]
     if missing:
         raise BankError(
             f"bank {bank.name} lacks the scene features {', '.join(missing)}; thin the bank again"
+        )
+    then = dict(zip(held, bank.manifest.probe, strict=True))
+    now = probe_features(bank.config.sensor)
+    # Machines add in another order, which changes less; another formula changes more.
+    changed = [name for name, value in now.items() if not isclose(value, then[name], abs_tol=1e-4)]
+    if changed:
+        raise BankError(
+            f"bank {bank.name} has other formulas of the scene features {', '.join(changed)}; thin "
+            "the bank again"
         )
     columns = [held.index(feature.name) for feature in SCENE_FEATURES]
     # Rows of other splits are NaN, as in `look_at_scenes`.
@@ -88,6 +98,29 @@ def stored_scenes(bank: ThinnedBank, clips: tuple[Clip, ...], network: StoredNet
         played[clip.start : clip.start + clip.frames] = True
     features = bank.scene_features(network)[:, columns]
     return Scenes(features.where(played, torch.nan), bank.log_ambient.where(played, torch.nan))
+
+
+def probe_features(sensor: SensorConfig) -> dict[str, float]:
+    """Scene features of one made-up frame by name, in which other formulas show.
+
+    A thinned bank keeps those of the formulas that it was made with.
+    """
+    down, across = torch.meshgrid(torch.arange(24.0), torch.arange(32.0), indexing="ij")
+    # Dark and bright, near and far, uneven in both directions.
+    gray = (0.5 + 0.31 * (down / 5).sin() + 0.18 * (across / 3 + down / 7).cos())[None]
+    exposure_s = torch.tensor([2e-3], dtype=torch.float64)
+    scene = Scene(
+        gray=gray,
+        log_ambient=log_ambient_of(gray, exposure_s, sensor),
+        predicted_m=sensor.max_range_m * gray.flip(1),
+        confidence=0.9 * gray.flip(2),
+        unambiguous_m=unambiguous_range_m(sensor.f1_hz),
+        range_m=sensor.max_range_m,
+        ego_speed_m_s=torch.tensor([7.3], dtype=torch.float64),
+        yaw_rate_rad_s=torch.tensor([-0.21], dtype=torch.float64),
+    )
+    values = evaluated(SCENE_FEATURES, scene)[0].tolist()
+    return {feature.name: value for feature, value in zip(SCENE_FEATURES, values, strict=True)}
 
 
 def log_ambient_of(gray: Tensor, exposure_s: Tensor, sensor: SensorConfig) -> Tensor:

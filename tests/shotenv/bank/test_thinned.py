@@ -297,6 +297,16 @@ def test_a_bank_without_a_feature_of_today_is_refused(thinned, tiny_kwargs, monk
         open_problem(config)
 
 
+def test_a_bank_with_features_of_another_formula_is_refused(thinned, tiny_kwargs, monkeypatch):
+    last = SCENE_FEATURES[-1]
+    other = last._replace(value=lambda scene: 1.1 * last.value(scene))
+    monkeypatch.setattr("shotenv.decision.scenes.SCENE_FEATURES", (*SCENE_FEATURES[:-1], other))
+    config = env_config(**{**tiny_kwargs, "bank": str(thinned.folder), "frames_per_drive": 33})
+    words = "small has other formulas of the scene features yaw_rate; thin the bank again"
+    with pytest.raises(BankError, match=words):
+        open_problem(config)
+
+
 def test_a_thinned_bank_is_not_thinned_again(thinned, tmp_path):
     with pytest.raises(BankError, match="small holds every 4th pixel; thinning needs"):
         thin_bank(thinned, tmp_path / "again")
