@@ -1,7 +1,7 @@
 """A Gymnasium environment of an indirect time-of-flight sensor that pays for every sample.
 
-Importing this package registers `shotenv/ShotSchedule-v0` and its variants with images and with a
-reward that is a vector; it loads neither torch nor mitsuba.
+Importing this package registers `shotenv/ShotSchedule-v0` and its variants: with images, with a
+reward that is a vector, and those that are compared often; it loads neither torch nor mitsuba.
 """
 
 from typing import Any
@@ -33,3 +33,7 @@ _register(ENV_ID, "ShotSchedule")
 _register(IMAGE_ENV_ID, "ShotSchedule", kwargs={"observation": "image", "bank": "starter"})
 # Gymnasium's checker would warn of each reward that it is no single number.
 _register(MO_ENV_ID, "MOShotSchedule", disable_env_checker=True)
+# What is compared often: heat that binds, the strongest unwrapping, families never trained on.
+_register("shotenv/ShotSchedule-Hot-v0", "ShotSchedule", kwargs={"config": "hot"})
+_register("shotenv/ShotSchedule-Strong-v0", "ShotSchedule", kwargs={"config": "strong"})
+_register("shotenv/ShotSchedule-Shift-v0", "ShotSchedule", kwargs={"split": "shift"})

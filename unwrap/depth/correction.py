@@ -24,6 +24,7 @@ from unwrap.signal import (
     Sensed,
     SensorDescription,
     Shots,
+    angle_rad,
     decode_at,
     distance_m,
     is_strong,
@@ -240,7 +241,7 @@ def _by_loop(
     cosine, sine, amplitude, residual = quadratures(raw.dcs_lsb, calibration.offset_lsb)
     # The phase overwrites the cosine, the distance the sine: both maps belong to this function
     # alone, and lie in the processor's cache, where new memory would have to be fetched.
-    phase_rad, depth_m = torch.atan2(sine, cosine, out=cosine), sine
+    phase_rad, depth_m = angle_rad(sine, cosine, out=cosine), sine
     valid = torch.empty(raw.saturated.shape, dtype=torch.bool)
     unambiguous_m = unambiguous_range_m(sensor.f1_hz)
     shift_turns = np.zeros(len(valid), np.float32)

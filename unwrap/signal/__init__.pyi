@@ -1,6 +1,7 @@
 from .calibrated import decode_at as decode_at, phase_at as phase_at, samples_at as samples_at
 from .decoding import (
     TWO_PI as TWO_PI,
+    angle_rad as angle_rad,
     decode as decode,
     distance_m as distance_m,
     quadratures as quadratures,

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import torch
 from torch import Tensor
 
-from unwrap.signal.decoding import quadratures, to_phase_, to_turns_
+from unwrap.signal.decoding import angle_rad, quadratures, to_phase_, to_turns_
 from unwrap.signal.description import SensorDescription
 from unwrap.signal.frames import PhaseFrame, RawFrame
 from unwrap.signal.shots import SAMPLES_PER_FREQUENCY
@@ -57,10 +56,10 @@ def phase_at(
     shift_m: Tensor | None,
 ) -> Tensor:
     """Phase [B, H, W] in [0, 2 pi) of quadratures at f1 (0) or f2 (1); see `decode_at`."""
-    angle_rad = torch.atan2(sine, cosine)
+    angle = angle_rad(sine, cosine)
     # Without a table there is nothing to look up, and the same conversion is one multiplication.
     to_turns = to_turns_ if sensor.wiggle is None else sensor.wiggle[frequency].turns_of
-    turns = to_turns(angle_rad)
+    turns = to_turns(angle)
     if shift_m is not None:
         shift_turns_(turns, shift_m, (sensor.f1_hz, sensor.f2_hz)[frequency])
     return to_phase_(turns)

@@ -22,6 +22,9 @@ from unwrap.support import array, array_of, can_loop, loop
 Array = np.ndarray
 # float32, since a Python float would make the arithmetic of a loop float64.
 HALF, ZERO = np.float32(0.5), np.float32(0.0)
+VECTOR, PART, THREADS = 64, 32768, 64
+"""Numbers that fill whole vectors of any processor; the least that torch gives to a thread; and
+the most threads that it shares maps among."""
 TWO_PI = 2 * math.pi
 BELOW_TWO_PI = float(np.nextafter(np.float32(TWO_PI), np.float32(0)))
 """Largest float32 phase of a period."""
@@ -65,8 +68,23 @@ def decode(dcs: Tensor, *, offset_lsb: Tensor | None = None) -> PhaseFrame:
     (tensor([[1.5708]]), tensor([[100.]]))
     """
     cosine, sine, amplitude, residual = quadratures(dcs, offset_lsb)
-    phase_rad = to_phase_(to_turns_(torch.atan2(sine, cosine)))
+    phase_rad = to_phase_(to_turns_(angle_rad(sine, cosine)))
     return PhaseFrame(phase_rad, amplitude, residual)
+
+
+def angle_rad(sine: Tensor, cosine: Tensor, *, out: Tensor | None = None) -> Tensor:
+    """`torch.atan2`, the same to the last bit whatever else is in the batch.
+
+    torch computes in vectors of some numbers, and what is left over by another function, whose last
+    bit may differ. So maps are filled up to whole vectors, in each of the parts that threads take.
+    """
+    count = sine.numel()
+    missing = -count % (VECTOR if count <= PART else THREADS * VECTOR)
+    if not missing or not can_loop(sine, cosine):
+        return torch.atan2(sine, cosine, out=out)
+    filled = (torch.cat((maps.reshape(-1), maps.new_ones(missing))) for maps in (sine, cosine))
+    found = torch.atan2(*filled)[:count].view(sine.shape)
+    return found if out is None else out.copy_(found)
 
 
 def quadratures(
