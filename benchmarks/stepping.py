@@ -100,7 +100,9 @@ def single(fields: dict[str, object], shots: Shots) -> dict:
 def least(acquisitions: Sequence[Shots], pixels: torch.Tensor) -> None:
     """Draw the normals of each acquisition, and take one atan2 over its pixels."""
     for shots in acquisitions:
-        for _ in islice(noise_samples([0], [0], HEIGHT, WIDTH), shots):
+        # Of two samples the reward's reference needs two more.
+        drawn = max(shots, Shots.FOUR)
+        for _ in islice(noise_samples([0], [0], HEIGHT, WIDTH), drawn):
             pass
         torch.atan2(pixels[0], pixels[1])
 
