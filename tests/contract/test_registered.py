@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env, data_equivalence
+from variants import kwargs_of
 
 import shotenv
 from shotenv.config.keywords import env_config
@@ -22,9 +23,8 @@ IDS = sorted(name for name in gymnasium.registry if name.startswith("shotenv/"))
 def tiny_kwargs(request, tiny_kwargs):
     """Those of the tiny bank, but for held-out families, of which it has no clip."""
     params = getattr(request.node, "callspec", None) and request.node.callspec.params.values()
-    if params and any("Shift" in value for value in params if isinstance(value, str)):
-        return {"bank": "pocket", "frames_per_drive": tiny_kwargs["frames_per_drive"]}
-    return tiny_kwargs
+    named = [value for value in params or () if str(value).startswith("shotenv/")]
+    return kwargs_of(named[0], tiny_kwargs) if named else tiny_kwargs
 
 
 @pytest.fixture(params=IDS)

@@ -13,6 +13,7 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
+from variants import kwargs_of
 
 import shotenv  # noqa: F401 - registers the environments
 from shotenv.sensor.acquisition import expose
@@ -27,7 +28,7 @@ STEPS = 500
 PROGRAM = """
 import json, sys, torch
 torch.set_num_threads(int(sys.argv[2]))
-sys.path.insert(0, sys.argv[3])
+sys.path[:0] = [sys.argv[3], sys.argv[3] + "/../helpers"]
 from test_determinism import played
 print(json.dumps(played(json.loads(sys.argv[1]))))
 """
@@ -40,7 +41,7 @@ def played(kwargs) -> list[str]:
     """
     lines = []
     for env_id in IDS:
-        env = gymnasium.make_vec(env_id, num_envs=2, **kwargs)
+        env = gymnasium.make_vec(env_id, num_envs=2, **kwargs_of(env_id, kwargs))
         told: list[tuple[str, object]] = [
             ("predicted", env.unwrapped.problem.kept.distance_m.numpy()),
             ("reset", env.reset(seed=17)),
@@ -64,7 +65,7 @@ def sha256_of(thing) -> str:
 
 @pytest.mark.parametrize("env_id", IDS)
 def test_two_environments_agree_over_500_steps_and_resets(tiny_kwargs, env_id):
-    twins = [gymnasium.make(env_id, **tiny_kwargs) for _ in range(2)]
+    twins = [gymnasium.make(env_id, **kwargs_of(env_id, tiny_kwargs)) for _ in range(2)]
     assert len({sha256_of(twin.reset(seed=3)) for twin in twins}) == 1
     for action in np.random.default_rng(5).integers(0, 3, STEPS):
         left, right = (twin.step(action) for twin in twins)
