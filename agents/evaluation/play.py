@@ -37,6 +37,11 @@ float64 [N, T]
         Scene family of the frame.
     clip : int64 [N, T]
         Number of the bank's clip that the frame is of.
+    power_price : float64 [N]
+        Weight of power in the reward of each drive.
+    reward_per_price : float64 [N, T]
+        What a unit of that weight adds to the reward: `scale` times the term `power` of 4 DCS less
+        that of what was taken.
     """
 
     seeds: np.ndarray
@@ -50,6 +55,13 @@ float64 [N, T]
     temperature_k: np.ndarray
     family: np.ndarray
     clip: np.ndarray
+    power_price: np.ndarray
+    reward_per_price: np.ndarray
+
+    def returns_at(self, price: float) -> np.ndarray:
+        """Returns [N] of the same frames, had power weighed `price` in the reward of all drives."""
+        other = (price - self.power_price)[:, None] * self.reward_per_price
+        return (self.reward + other).sum(axis=1)
 
     @property
     def per_drive(self) -> dict[str, np.ndarray]:
@@ -114,6 +126,7 @@ def play_drives(
     envs: VectorEnv,
     seeds: Sequence[int],
     *,
+    price: float | None = None,
     tick: Callable[[int], object] = lambda frames: None,
 ) -> PlayedDrives:
     """Drive one drive per environment, all at once, to the end.
@@ -126,15 +139,22 @@ def play_drives(
         As many environments as `seeds`, in any autoreset mode.
     seeds : sequence of int
         Seed of each drive.
+    price : float, optional
+        Weight of power in the reward of all drives; each drive's own by default.
     tick : callable
         Told the number of frames driven after each step.
     """
     one_each: Any = list(seeds)  # gymnasium's annotation forgets sequences
-    observations, infos = envs.reset(seed=one_each)
+    options = {} if price is None else {"power_price": price}
+    observations, infos = envs.reset(seed=one_each, options=options)
     policy.reset()
     unwrapped: Any = envs.unwrapped  # gymnasium's annotation does not know our attributes
     families = np.array(unwrapped.family_names)
     starts = np.array([clip.start for clip in unwrapped.problem.bank.clips])
+    power_price = np.array(infos["power_price"])
+    # Of the drives as they begin, which an environment that starts anew by itself replaces.
+    drive, scale = unwrapped.state.drive, unwrapped.problem.config.reward.scale
+    power_of_four = (drive.always_four.energy_j / drive.always_eight.energy_j).numpy()
     # All drives are equally long: they end in the same step, and no frame of a next one is kept.
     frames: list[dict[str, np.ndarray]] = []
     done = np.zeros(len(seeds), dtype=bool)
@@ -157,9 +177,10 @@ def play_drives(
                 "wrap_accuracy": np.where(off, np.nan, told["wrap_accuracy"]),
                 "temperature_k": np.array(told["temperature_k"]),
                 "family": families[told["family"]],
+                "reward_per_price": scale * (power_of_four - told["reward_terms"]["power"]),
                 "clip": np.searchsorted(starts, told["frame"], side="right") - 1,
             }
         )
         tick(len(seeds))
     stacked = {name: np.stack([frame[name] for frame in frames], axis=1) for name in frames[0]}
-    return PlayedDrives(seeds=np.asarray(seeds), **stacked)
+    return PlayedDrives(seeds=np.asarray(seeds), power_price=power_price, **stacked)

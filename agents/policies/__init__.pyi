@@ -1,6 +1,9 @@
+from .bandits import LinUcbPolicy as LinUcbPolicy, ThompsonPolicy as ThompsonPolicy
+from .families import FAMILIES_OF_PRACTICE as FAMILIES_OF_PRACTICE, Family as Family
 from .fixed import (
     CyclePolicy as CyclePolicy,
     FixedPolicy as FixedPolicy,
+    MixturePolicy as MixturePolicy,
     RandomPolicy as RandomPolicy,
 )
 from .learned import (
@@ -9,9 +12,21 @@ from .learned import (
     load_policy as load_policy,
     network_arguments as network_arguments,
 )
+from .looking import (
+    LookAndHoldPolicy as LookAndHoldPolicy,
+    LookAndWeighPolicy as LookAndWeighPolicy,
+    PersistencePolicy as PersistencePolicy,
+)
 from .policy import Action as Action, Observation as Observation, Policy as Policy
 from .rules import (
     SNR_FEATURE as SNR_FEATURE,
     SnrThresholdPolicy as SnrThresholdPolicy,
+    SnrTwoThresholdPolicy as SnrTwoThresholdPolicy,
     rule_in_words as rule_in_words,
+)
+from .watching import (
+    DistanceHysteresisPolicy as DistanceHysteresisPolicy,
+    MotionPolicy as MotionPolicy,
+    UnsurePolicy as UnsurePolicy,
+    WakeOnChangePolicy as WakeOnChangePolicy,
 )

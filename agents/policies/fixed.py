@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -50,6 +50,43 @@ class RandomPolicy(Policy):
     def reset(self) -> None:
         """Draw the same numbers again."""
         self._generator = np.random.default_rng(self._seed)
+
+
+class MixturePolicy(Policy):
+    """Each action with a probability of its own, whatever is observed.
+
+    Parameters
+    ----------
+    probabilities : sequence of 3 floats
+        Of 2, 4 and 8 DCS.
+    seed : int
+        Of the draws.
+    """
+
+    def __init__(self, probabilities: Sequence[float], seed: int = 0) -> None:
+        shares = np.asarray(probabilities, dtype=np.float64)
+        valid = shares.shape == (len(Shots),) and (shares >= 0).all()
+        if not valid or abs(shares.sum() - 1.0) > 1e-9:
+            raise ValueError(
+                f"probabilities is {probabilities!r}; expected three numbers >= 0 that add up to 1"
+            )
+        self._shares = shares
+        self._seed = seed
+        self.reset()
+
+    def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
+        """A fresh draw for each environment."""
+        shape = batch_shape(observation)
+        return single(self._generator.choice(len(Shots), size=shape, p=self._shares))
+
+    def reset(self) -> None:
+        """Draw the same numbers again."""
+        self._generator = np.random.default_rng(self._seed)
+
+    def __str__(self) -> str:
+        """The mixture in words."""
+        parts = [f"{share:.0%} {shots:d} DCS" for share, shots in zip(self._shares, Shots)]
+        return f"at random {', '.join(parts)}"
 
 
 class CyclePolicy(Policy):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -33,6 +33,9 @@ class Policy(ABC):
     >>> Dim().act(np.array([[0.05], [0.7]]))
     array([2, 0])
     """
+
+    reads_price: ClassVar[bool] = False
+    """Whether it acts on the price of power; what does not plays the same at every price."""
 
     @abstractmethod
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:

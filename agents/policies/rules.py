@@ -1,4 +1,4 @@
-"""Rules that a person can read off: one threshold on one feature."""
+"""Rules that a person can read off: thresholds on one feature."""
 
 from __future__ import annotations
 
@@ -42,6 +42,49 @@ class SnrThresholdPolicy(Policy):
     def __str__(self) -> str:
         """The rule in words."""
         return rule_in_words(self.threshold, self.below, self.above)
+
+
+class SnrTwoThresholdPolicy(Policy):
+    """Two thresholds on the signal-to-noise ratio of the last acquisition: three kinds of frames.
+
+    Parameters
+    ----------
+    low, high : float
+        Thresholds, as that of `SnrThresholdPolicy`; `low` <= `high`.
+    below, between, above : int
+        Shots below `low`, from it on, and from `high` on.
+    """
+
+    def __init__(
+        self,
+        feature_names: Sequence[str],
+        low: float,
+        high: float,
+        below: int = 8,
+        between: int = 4,
+        above: int = 2,
+    ) -> None:
+        if not low <= high:
+            raise ValueError(f"low is {low!r} and high {high!r}; expected low <= high")
+        self._index = feature_index(feature_names, SNR_FEATURE)
+        self.low, self.high = low, high
+        self.shots = tuple(checked_shots(shots) for shots in (below, between, above))
+
+    def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
+        """Shots by the band in which the last signal-to-noise was."""
+        ratio = np.asarray(observation)[..., self._index]
+        below, between, above = (shots.action for shots in self.shots)
+        return single(
+            np.where(ratio < self.low, below, np.where(ratio < self.high, between, above))
+        )
+
+    def __str__(self) -> str:
+        """The rule in words."""
+        below, between, above = self.shots
+        return (
+            f"{below:d} DCS where {SNR_FEATURE} < {self.low:.3f}, {between:d} where it is < "
+            f"{self.high:.3f}, else {above:d}"
+        )
 
 
 def rule_in_words(threshold: float, below: int, above: int) -> str:
