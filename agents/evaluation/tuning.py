@@ -18,7 +18,7 @@ from shotenv.decision import FEATURE_NAMES
 from unwrap.support import progress
 
 PlayAt = Callable[[Policy, float | None], PlayedDrives]
-"""Drives of a policy at a price; at None, which is asked of policies that do not read it, at any."""
+"""Drives of a policy at a price; at None, which suffices for one that does not read it, at any."""
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Linear contextual bandits that learn on the drive, from what the sensor itself measures.
 
-No true error is used: labels are the measured regrets, which only frames of 8 DCS tell. Such a frame
-tells those of all shots at once, and one of 2 DCS tells nothing, whatever it brings. What is
+No true error is used: labels are the measured regrets, which only frames of 8 DCS tell. Such a
+frame tells those of all shots at once, and one of 2 DCS tells nothing, whatever it brings. What is
 unknown is therefore not tried but looked at: doubt counts against 2 and 4 DCS, and 8 DCS teach.
 """
 

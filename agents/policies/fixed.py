@@ -85,7 +85,9 @@ class MixturePolicy(Policy):
 
     def __str__(self) -> str:
         """The mixture in words."""
-        parts = [f"{share:.0%} {shots:d} DCS" for share, shots in zip(self._shares, Shots)]
+        parts = [
+            f"{share:.0%} {shots:d} DCS" for share, shots in zip(self._shares, Shots, strict=True)
+        ]
         return f"at random {', '.join(parts)}"
 
 

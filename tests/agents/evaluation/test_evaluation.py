@@ -128,6 +128,8 @@ def made_up_played(rewards):
         temperature_k=300 * ones,
         family=np.full(shape, "garage"),
         clip=np.broadcast_to(np.arange(shape[0])[:, None] // 2, shape),
+        power_price=np.zeros(shape[0]),
+        reward_per_price=np.zeros(shape),
         life_used_h=ones,
     )
 
