@@ -68,42 +68,43 @@ class LinearBanditPolicy(Policy):
         self.forget = forget
         self._shares = np.asarray(energy_shares)
         self._read = Readings(feature_names, "last_eight", "power_price", *CONTEXT)
-        self.reset()
+        self._context: np.ndarray | None = None
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
         """What costs least by what was learnt so far; learns first from the last frame."""
         shape = np.shape(self._read("last_eight", observation))
         size = len(CONTEXT) + 1
-        if self._context is None:
+        before = self._context
+        if before is None:
             prior = self.ridge * np.eye(size)
             self._precision = np.broadcast_to(prior, (*shape, size, size)).copy()
             self._moment = np.zeros((*shape, size, len(REGRETS)))
         else:
-            self._learn(observation)
+            self._learn(before, observation)
         features = [self._read(name, observation) for name in CONTEXT]
-        first = self._context is None
-        context = self._context = np.stack([np.ones(shape), *features], axis=-1)
+        context = np.stack([np.ones(shape), *features], axis=-1)
+        self._context = context
         covariance = np.linalg.inv(self._precision)
         doubt = np.sqrt(np.einsum("...i,...ij,...j->...", context, covariance, context))
         mean = np.einsum("...i,...ij->...j", context, covariance @ self._moment)
         regret = self._judged(mean, doubt)
         cost = self._read.power_price(observation)[..., None] * self._shares
-        cost[..., : len(REGRETS)] += np.inf if first else regret
+        cost[..., : len(REGRETS)] += np.inf if before is None else regret
         return single(cost.argmin(axis=-1))
 
     def reset(self) -> None:
         """Forget all drives."""
-        self._context: np.ndarray | None = None
+        self._context = None
 
     @abstractmethod
     def _judged(self, mean: np.ndarray, doubt: np.ndarray) -> np.ndarray:
         """Regrets [..., 2] to act on, of their means [..., 2] and the common doubt [...]."""
 
-    def _learn(self, observation: Observation) -> None:
-        """Add the frame before, where it was one of 8 DCS and so told both regrets."""
+    def _learn(self, context: np.ndarray, observation: Observation) -> None:
+        """Add the frame before, of `context`, where it was one of 8 DCS and so told both regrets."""
         told = self._read("last_eight", observation)[..., None, None] > 0.5
         regrets = self._read.regrets(observation)[..., : len(REGRETS)]
-        context, prior = self._context, self.ridge * np.eye(len(CONTEXT) + 1)
+        prior = self.ridge * np.eye(len(CONTEXT) + 1)
         square = context[..., :, None] * context[..., None, :]
         product = context[..., :, None] * regrets[..., None, :]
         # The prior is not forgotten, or the precision would vanish along what is never seen.
@@ -145,8 +146,9 @@ class ThompsonPolicy(LinearBanditPolicy):
         seed: int = 0,
         energy_shares: Sequence[float] = ENERGY_SHARES,
     ) -> None:
-        self._seed = seed
         super().__init__(feature_names, width, ridge, forget, energy_shares=energy_shares)
+        self._seed = seed
+        self._generator = np.random.default_rng(seed)
 
     def _judged(self, mean: np.ndarray, doubt: np.ndarray) -> np.ndarray:
         # The context's regret is normal with this deviation, which is all that a draw of the

@@ -85,9 +85,8 @@ class MixturePolicy(Policy):
 
     def __str__(self) -> str:
         """The mixture in words."""
-        parts = [
-            f"{share:.0%} {shots:d} DCS" for share, shots in zip(self._shares, Shots, strict=True)
-        ]
+        shares = zip(self._shares, Shots, strict=True)
+        parts = [f"{share:.0%} {shots:d} DCS" for share, shots in shares]
         return f"at random {', '.join(parts)}"
 
 

@@ -157,7 +157,7 @@ class LookAndWeighPolicy(Policy):
 
     def __str__(self) -> str:
         """The rule in words."""
-        heat = f", heat {self.heat_price:g} at the trip" if self.heat_price else ""
+        heat = f", heat {self.heat_price:g}, near {self.near_k:g} K" if self.heat_price else ""
         return f"{self.looks}, then the least of {self.gain:g} x regret + price x energy{heat}"
 
 
@@ -182,7 +182,7 @@ class Looks:
         self.amplitude_change = checked_at_least("amplitude_change", amplitude_change, 0.0)
         needed = ("since_eight", "change_since_eight", "amplitude")
         self._read = Readings(feature_names, *needed)
-        self.reset()
+        self._amplitude_at_look = np.array(0.0)
 
     def due(self, observation: Observation) -> np.ndarray:
         """Where to look in this frame, bool [] or [N]."""

@@ -42,17 +42,18 @@ class DistanceHysteresisPolicy(Policy):
         self.far = checked_at_least("far", far, near)
         self.few, self.more = checked_shots(few), checked_shots(more)
         self._read = Readings(feature_names, "network_distance")
-        self.reset()
+        self._is_far = np.array(True)
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
         """Shots of the mode that the distance, or between the limits the last frame, asks for."""
         distance = self._read("network_distance", observation)
-        self._is_far = (distance > self.far) | (self._is_far & (distance >= self.near))
+        stays_far = self._is_far & (distance >= self.near)
+        self._is_far = np.asarray((distance > self.far) | stays_far)
         return single(np.where(self._is_far, self.more.action, self.few.action))
 
     def reset(self) -> None:
         """Begin in the mode of more shots."""
-        self._is_far: np.ndarray | np.bool_ = np.True_
+        self._is_far = np.array(True)
 
     def __str__(self) -> str:
         """The rule in words."""
@@ -85,7 +86,7 @@ class WakeOnChangePolicy(Policy):
         self.still_frames = int(checked_at_least("still_frames", still_frames, 1))
         self.asleep = checked_shots(asleep)
         self._read = Readings(feature_names, "gray_change")
-        self.reset()
+        self._still = np.array(-1)
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
         """8 DCS until the image has been still long enough."""
