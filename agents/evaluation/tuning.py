@@ -13,7 +13,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 
 from agents.evaluation.play import PlayedDrives, play_drives
-from agents.policies import Family, Policy
+from agents.policies import Policy, PolicyFamily
 from shotenv.decision import FEATURE_NAMES
 from unwrap.support import progress
 
@@ -66,7 +66,7 @@ def best_at_prices(
 
 
 def tune(
-    families: Sequence[Family], envs: VectorEnv, seeds: Sequence[int], prices: Sequence[float]
+    families: Sequence[PolicyFamily], envs: VectorEnv, seeds: Sequence[int], prices: Sequence[float]
 ) -> dict[str, list[Tuned]]:
     """The best of each family at each price, tuned on the drives `seeds` of `envs`.
 

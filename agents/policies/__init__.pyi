@@ -1,5 +1,4 @@
 from .bandits import LinUcbPolicy as LinUcbPolicy, ThompsonPolicy as ThompsonPolicy
-from .families import FAMILIES_OF_PRACTICE as FAMILIES_OF_PRACTICE, Family as Family
 from .fixed import (
     CyclePolicy as CyclePolicy,
     FixedPolicy as FixedPolicy,
@@ -18,6 +17,10 @@ from .looking import (
     PersistencePolicy as PersistencePolicy,
 )
 from .policy import Action as Action, Observation as Observation, Policy as Policy
+from .practice import (
+    FAMILIES_OF_PRACTICE as FAMILIES_OF_PRACTICE,
+    PolicyFamily as PolicyFamily,
+)
 from .rules import (
     SNR_FEATURE as SNR_FEATURE,
     SnrThresholdPolicy as SnrThresholdPolicy,

@@ -101,7 +101,7 @@ class LinearBanditPolicy(Policy):
         """Regrets [..., 2] to act on, of their means [..., 2] and the common doubt [...]."""
 
     def _learn(self, context: np.ndarray, observation: Observation) -> None:
-        """Add the frame before, of `context`, where it was one of 8 DCS and so told both regrets."""
+        """Add the frame of `context`, where it was one of 8 DCS and so told both regrets."""
         told = self._read("last_eight", observation)[..., None, None] > 0.5
         regrets = self._read.regrets(observation)[..., : len(REGRETS)]
         prior = self.ridge * np.eye(len(CONTEXT) + 1)

@@ -3,9 +3,9 @@ import pytest
 
 from agents.evaluation.play import PlayedDrives, make_envs, play_drives
 from agents.evaluation.tuning import best_at_prices, tune
-from agents.policies.families import Family
 from agents.policies.fixed import FixedPolicy, RandomPolicy
 from agents.policies.policy import Policy
+from agents.policies.practice import PolicyFamily
 from shotenv.config.keywords import env_config
 
 SEEDS = [1000, 1001]
@@ -87,7 +87,7 @@ def test_returns_at_another_price_are_those_of_a_play_at_it(envs):
 
 
 def test_the_tuner_on_real_drives_takes_the_best_of_what_it_played(envs):
-    family = Family("fixed", lambda names: (FixedPolicy(shots) for shots in (2, 4, 8)))
+    family = PolicyFamily("fixed", lambda names: (FixedPolicy(shots) for shots in (2, 4, 8)))
     (best,) = tune([family], envs, SEEDS, (5.0,))["fixed"]
     assert best.policy.action == 0, "power this dear leaves 2 DCS alone"
     assert best.mean_return == pytest.approx(

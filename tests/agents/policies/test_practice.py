@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from agents.policies.bandits import LinUcbPolicy, ThompsonPolicy
-from agents.policies.families import FAMILIES_OF_PRACTICE
 from agents.policies.fixed import MixturePolicy
 from agents.policies.looking import LookAndHoldPolicy, LookAndWeighPolicy, PersistencePolicy
+from agents.policies.practice import FAMILIES_OF_PRACTICE
 from agents.policies.readings import Readings
 from agents.policies.rules import SnrTwoThresholdPolicy
 from agents.policies.watching import (

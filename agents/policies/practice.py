@@ -22,7 +22,7 @@ from agents.policies.watching import (
 from unwrap.signal import Shots
 
 
-class Family(NamedTuple):
+class PolicyFamily(NamedTuple):
     """Policies of one kind.
 
     Attributes
@@ -143,7 +143,7 @@ def thompson(names: Names) -> Iterator[Policy]:
 
 
 FAMILIES_OF_PRACTICE: Final = tuple(
-    Family(function.__name__, function)
+    PolicyFamily(function.__name__, function)
     for function in (
         fixed,
         cycle,
