@@ -113,21 +113,20 @@ def persistence(names: Names) -> Iterator[Policy]:
 
 def look_and_hold(names: Names) -> Iterator[Policy]:
     """Looks after a change, then what was good enough."""
-    for limit, period, change in product(LIMITS, (12, 24), (0.1, 0.3)):
-        yield LookAndHoldPolicy(names, limit, period, change, 0.1)
+    for limit, period, amplitude in product(LIMITS, (12, 24), (0.1, 0.3)):
+        yield LookAndHoldPolicy(names, limit, period, 0.3, amplitude)
 
 
 def look_and_weigh(names: Names) -> Iterator[Policy]:
     """Looks after a change, then what regret and price weigh least."""
-    grid = product((12, 24), (0.1, 0.3), (0.1,), (0.7, 1.0))
-    for period, change, amplitude, gain in grid:
-        yield LookAndWeighPolicy(names, period, change, amplitude, gain=gain)
+    for period, amplitude, gain in product((24, 48), (0.1, 0.3), (0.6, 1.0)):
+        yield LookAndWeighPolicy(names, period, 0.3, amplitude, gain=gain)
 
 
 def look_and_weigh_heat(names: Names) -> Iterator[Policy]:
     """The same with a price on heat."""
-    for period, heat, near_k in product((16, 24), (0.05, 0.2), (0.5, 2.0)):
-        yield LookAndWeighPolicy(names, period, 0.3, 0.1, heat_price=heat, near_k=near_k)
+    for amplitude, heat, near_k in product((0.1, 0.3), (0.05, 0.2), (0.5, 2.0)):
+        yield LookAndWeighPolicy(names, 24, 0.3, amplitude, heat_price=heat, near_k=near_k)
 
 
 def lin_ucb(names: Names) -> Iterator[Policy]:
