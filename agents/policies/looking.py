@@ -59,7 +59,7 @@ class LookAndHoldPolicy(Policy):
     """Looks with 8 DCS after a change or every n frames, then holds the fewest shots that do.
 
     A change is one of the gray image since the last look, or, because the dark shows none, one of
-    the measured amplitude since the frame after it.
+    the measured amplitude.
 
     Parameters
     ----------
@@ -189,9 +189,9 @@ class Looks:
         frames = np.rint(self._read.frames_since_eight(observation))
         # The feature is log10 over 3.
         amplitude = 3.0 * self._read("amplitude", observation)
-        # That of the first held frame counts: noise makes the amplitude of 2 DCS larger than that
-        # of 8, and in the dark every frame would differ from the look.
-        self._amplitude_at_look = np.where(frames <= 1, amplitude, self._amplitude_at_look)
+        # That of the 8 DCS themselves, though 2 read more where noise is all there is: the looks
+        # that this adds in the dark are worth more than they cost.
+        self._amplitude_at_look = np.where(frames == 0, amplitude, self._amplitude_at_look)
         changed = self._read("change_since_eight", observation) > self.change
         moved = np.abs(amplitude - self._amplitude_at_look) > self.amplitude_change
         return changed | moved | (frames >= self.period - 1)

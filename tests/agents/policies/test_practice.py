@@ -117,9 +117,6 @@ def test_look_and_hold_looks_after_a_change_of_gray_or_amplitude():
     dimmed = looked(4, 0.05, 0.02, amplitude=0.4)
     assert shots_of(policy, still, held, changed, still, held, dimmed) == [2, 2, 8, 2, 2, 8]
     assert shots_of(policy, still, looked(14, 0.05), looked(15, 0.05)) == [2, 8, 8]
-    # 2 DCS read another amplitude than the look did; what changes after them is the scene.
-    frames = [looked(n, 0.05, amplitude=a) for n, a in ((0, 0.5), (1, 0.4), (2, 0.4), (3, 0.3))]
-    assert shots_of(policy, *frames) == [2, 2, 2, 8]
 
 
 def test_look_and_weigh_weighs_regret_against_the_observed_price():
