@@ -43,7 +43,7 @@ class Measurement:
     features: Tensor
 
 
-Measure = Callable[[Problem, Drive, Tensor, Shots, Tensor | None], Measurement]
+Measure = Callable[[Problem, Drive, Tensor, Tensor, Tensor | None], Measurement]
 """`measure_frames`, or what gives the same numbers faster (`MeasurementCache`)."""
 
 
@@ -51,24 +51,41 @@ def measure_frames(
     problem: Problem,
     drive: Drive,
     step: Tensor,
-    shots: Shots,
+    shots: Shots | Tensor,
     power_w: Tensor | None = None,
     *,
     noise: Sequence[Tensor] | None = None,
 ) -> Measurement:
-    """Acquire, correct and score the frames at `step` [B] of `drive`; see `acquire_depths`."""
+    """Acquire, correct and score the frames at `step` [B] of `drive`; see `acquire_depths`.
+
+    Parameters
+    ----------
+    shots : Shots or int64 [B]
+        Of all frames, or of each: 2, 4 or 8. All frames take the most samples that one of them
+        needs, so that those of 8 are better measured by themselves; see `measure_by_shots`.
+    """
+    # Counts that are asked for, the most first.
+    each = torch.full_like(step, int(shots)) if isinstance(shots, Shots) else shots
+    most, *fewer = sorted(map(Shots, set(each.tolist())), reverse=True)
     # Of two samples the reference needs two more, which are taken for it alone.
-    counts = [n for n in Shots if n <= max(shots, Shots.FOUR)]
+    counts = [n for n in Shots if n <= max(most, Shots.FOUR)]
     acquired = acquire_depths(problem, drive, step, counts, power_w, noise=noise)
-    taken = acquired[: counts.index(shots) + 1]
     reference = acquired[counts.index(Shots.FOUR)]
     if power_w is not None and drive.is_derated(power_w):
         (reference,) = acquire_depths(problem, drive, step, (Shots.FOUR,), noise=noise)
-    return Measurement(
-        score_of(problem, taken[-1]),
-        score_of(problem, reference).error,
-        told_by(problem, taken),
-    )
+    scores = {counts[place]: score_of(problem, one) for place, one in enumerate(acquired)}
+    derated = reference is not acquired[counts.index(Shots.FOUR)]
+    error_of_four = score_of(problem, reference).error if derated else scores[Shots.FOUR].error
+
+    def measured(count: Shots) -> Measurement:
+        taken = acquired[: counts.index(count) + 1]
+        return Measurement(scores[count], error_of_four, told_by(problem, taken))
+
+    found = measured(most)
+    for count in fewer:
+        rows = (each == count).nonzero().squeeze(1)
+        found = put(found, rows, take(measured(count), rows))
+    return found
 
 
 def measure_prefixes(
@@ -107,7 +124,7 @@ def measure_by_shots(
 ) -> Measurement:
     """Measure the frame of every drive with its own number of samples.
 
-    Drives that take the same number are one batch. A feature that these samples cannot tell stays
+    Drives of 2 and 4 samples are one batch, those of 8 another. A feature that these samples cannot tell stays
     as an earlier frame told it: after 8, then 2 DCS, `regret_of_two` is that of the 8.
 
     Parameters
@@ -118,21 +135,24 @@ def measure_by_shots(
         What each laser emits while on, W.
     """
     drive, step, before = state.drive, state.step, state.seen.features
-    counts = set(shots.tolist())
+    # Frames of 2 and of 4 samples both take 4, for the reward's reference.
+    drawn = shots.clamp(min=int(Shots.FOUR)).masked_fill_(shots == 0, 0)
+    counts = set(drawn.tolist())
     if len(counts) == 1 and 0 not in counts:
         # The whole batch as it is: picking rows would copy the offsets of every pixel.
-        found = measure(problem, drive, step, Shots(counts.pop()), power_w)
+        found = measure(problem, drive, step, shots, power_w)
     else:
         lost = no_depth(len(shots), problem.config.sensor.max_range_m)
         found = Measurement(lost, torch.zeros_like(lost.error), before)
         for count in sorted(counts):
-            rows = (shots == count).nonzero().squeeze(1)
+            rows = (drawn == count).nonzero().squeeze(1)
             part_drive, part_step = take(drive, rows), step[rows]
             if count:
-                part = measure(problem, part_drive, part_step, Shots(count), power_w[rows])
+                part = measure(problem, part_drive, part_step, shots[rows], power_w[rows])
             else:
                 # Nothing is measured; the reference is that of a laser which works.
-                four = measure(problem, part_drive, part_step, Shots.FOUR, None)
+                fours = torch.full_like(part_step, int(Shots.FOUR))
+                four = measure(problem, part_drive, part_step, fours, None)
                 part = Measurement(
                     take(lost, rows), four.error_of_four, before.index_select(0, rows)
                 )

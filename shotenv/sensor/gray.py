@@ -11,7 +11,7 @@ from shotenv.sensor.acquisition import pixel_of
 from shotenv.sensor.converter import full_scale_lsb
 from shotenv.sensor.electrons import electrons_per_radiance_second
 from shotenv.sensor.pixel_loops import noise_by_gray_, take_gray_
-from unwrap.support import array
+from unwrap.support import array, long_rows
 
 SHORTEST_EXPOSURE_S = 1e-5
 """What the light meter stops at in a scene however bright, s; assumed."""
@@ -108,7 +108,8 @@ def sample_noise_lsb(
     noise_lsb = np.empty(gray.shape, np.float32)
     dark = np.float32(dark_variance_lsb2(sensor))
     most = np.float32(sensor.offset_ambient_lsb)
-    noise_by_gray_(array(gray, None), per_word, dark, left, added, most, noise_lsb)
+    words = long_rows(array(gray, None))
+    noise_by_gray_(words, per_word, dark, left, added, most, long_rows(noise_lsb))
     return torch.from_numpy(noise_lsb)
 
 

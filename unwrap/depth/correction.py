@@ -33,7 +33,7 @@ from unwrap.signal import (
     samples_at,
     unambiguous_range_m,
 )
-from unwrap.support import array, array_of, can_loop
+from unwrap.support import array, array_of, can_loop, long_rows
 
 Eight = Literal["two_frequency", "kernel_density", "network"]
 """Who tells the wraps of eight samples, see `correct`."""
@@ -249,18 +249,18 @@ def _by_loop(
         # Python's remainder, in float64 and never negative, as in `shift_turns_`.
         shift_turns[:] = shift_m.numpy() % unambiguous_m / unambiguous_m
     merge_pixels(
-        array(phase_rad),
+        long_rows(array(phase_rad)),
         (FLAT if sensor.wiggle is None else sensor.wiggle[0]).turns_table,
         shift_turns,
-        array(amplitude),
-        array_of(calibration.noise_lsb, valid.shape),
-        array(raw.saturated, np.bool_),
-        array(predicted_m),
+        long_rows(array(amplitude)),
+        long_rows(array_of(calibration.noise_lsb, valid.shape)),
+        long_rows(array(raw.saturated, np.bool_)),
+        long_rows(array(predicted_m)),
         Limits(*map(np.float32, (unambiguous_m, sensor.saturation_range_m, sensor.min_snr))),
         RULES[merge].branch,
         # Written to; both are contiguous, so that `array` gives their own memory.
-        array(depth_m),
-        array(valid, np.bool_),
+        long_rows(array(depth_m)),
+        long_rows(array(valid, np.bool_)),
     )
     return DepthFrame(depth_m, valid, phase_rad, amplitude, residual, unambiguous_m)
 

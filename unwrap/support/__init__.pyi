@@ -3,6 +3,7 @@ from .compiled import (
     array_of as array_of,
     can_loop as can_loop,
     inlined as inlined,
+    long_rows as long_rows,
     loop as loop,
 )
 from .error_text import in_one_line as in_one_line

@@ -18,6 +18,9 @@ from numba.extending import register_jitable
 if TYPE_CHECKING:  # Processes that render start without torch.
     from torch import Tensor
 
+ONE_ROW = 1024
+"""Most pixels of a map that a loop takes as one row."""
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -55,6 +58,21 @@ def inlined(function: Function) -> Function:
 def array(tensor: Tensor, dtype: type | None = np.float32) -> np.ndarray:
     """The memory of `tensor` as a contiguous array; a copy where it is not, or of another type."""
     return np.ascontiguousarray(tensor.numpy(), dtype)
+
+
+def long_rows(maps: np.ndarray) -> np.ndarray:
+    """Contiguous maps [..., H, W] for a loop over rows; small ones as a single row [..., 1, H W].
+
+    For loops that do not ask for rows: what comes before and after the vector instructions of a
+    loop is a large part of a short row. Whole images stay, a row of which fits the first cache.
+
+    Examples
+    --------
+    >>> long_rows(np.zeros((64, 15, 20))).shape, long_rows(np.zeros((1, 120, 160))).shape
+    ((64, 1, 300), (1, 120, 160))
+    """
+    *leading, height, width = maps.shape
+    return maps.reshape(*leading, 1, height * width) if height * width <= ONE_ROW else maps
 
 
 def array_of(value: Tensor | float, shape: Sequence[int]) -> np.ndarray:
