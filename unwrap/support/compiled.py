@@ -19,7 +19,7 @@ if TYPE_CHECKING:  # Processes that render start without torch.
     from torch import Tensor
 
 ONE_ROW = 1024
-"""Most pixels of a map that a loop takes as one row."""
+"""Most pixels that a loop takes as one row."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -60,19 +60,22 @@ def array(tensor: Tensor, dtype: type | None = np.float32) -> np.ndarray:
     return np.ascontiguousarray(tensor.numpy(), dtype)
 
 
-def long_rows(maps: np.ndarray) -> np.ndarray:
-    """Contiguous maps [..., H, W] for a loop over rows; small ones as a single row [..., 1, H W].
+def long_rows(maps: np.ndarray, most: int = ONE_ROW) -> np.ndarray:
+    """Contiguous maps [..., H, W] for a loop over rows, several short rows being taken as one.
 
     For loops that do not ask for rows: what comes before and after the vector instructions of a
-    loop is a large part of a short row. Whole images stay, a row of which fits the first cache.
+    loop is a large part of a short row. A row has at most `most` pixels, or is left as it is.
 
     Examples
     --------
-    >>> long_rows(np.zeros((64, 15, 20))).shape, long_rows(np.zeros((1, 120, 160))).shape
-    ((64, 1, 300), (1, 120, 160))
+    >>> long_rows(np.zeros((64, 15, 20))).shape, long_rows(np.zeros((64, 15, 20)), 64).shape
+    ((64, 1, 300), (64, 5, 60))
+    >>> long_rows(np.zeros((1, 120, 160)), 64).shape
+    (1, 120, 160)
     """
     *leading, height, width = maps.shape
-    return maps.reshape(*leading, 1, height * width) if height * width <= ONE_ROW else maps
+    together = next((n for n in range(height, 1, -1) if height % n == 0 and n * width <= most), 1)
+    return maps.reshape(*leading, height // together, width * together)
 
 
 def array_of(value: Tensor | float, shape: Sequence[int]) -> np.ndarray:
