@@ -5,6 +5,7 @@ from .compiled import (
     inlined as inlined,
     long_rows as long_rows,
     loop as loop,
+    source_stamp as source_stamp,
 )
 from .error_text import in_one_line as in_one_line
 from .files import write_bytes as write_bytes, write_json as write_json, write_text as write_text

@@ -8,7 +8,10 @@ bit.
 
 from __future__ import annotations
 
+import inspect
+import zlib
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numba
@@ -48,6 +51,16 @@ def loop(function: Function) -> Function:
         return numba.njit(cache=True, **options)(function)
     except RuntimeError:  # No folder can be written to: installed read-only, without a home.
         return numba.njit(**options)(function)
+
+
+def source_stamp(*loops: Any) -> int:
+    """Number that changes with the files in which `loops` stand, for a loop that calls them.
+
+    As a variable of the enclosing function it is part of what Numba knows a loop by, and machine
+    code kept for former files is not taken for that of the present ones.
+    """
+    files = sorted({inspect.getfile(one.py_func) for one in loops})
+    return zlib.crc32(b"".join(Path(file).read_bytes() for file in files))
 
 
 def inlined(function: Function) -> Function:

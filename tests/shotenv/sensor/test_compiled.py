@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from shotenv.decision.measurement import sum_pixels_
-from shotenv.decision.score import score_pixels_
+from shotenv.decision.score import score_pixels_, sum_pixels_
 from shotenv.sensor import pixel_loops
 from unwrap.support.compiled import array, loop
 
