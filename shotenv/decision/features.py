@@ -251,7 +251,9 @@ samples, which leave out what takes more, and row 0, of none, is all false."""
 
 def evaluated(features: Sequence[Feature], seen: Scene | Sums | Now) -> Tensor:
     """Values of `features`, float32 [B, len(features)]."""
-    return torch.stack([feature.value(seen).to(torch.float32) for feature in features], dim=1)
+    # Converted together: torch finds the type that holds all of them, and each number is rounded
+    # once.
+    return torch.stack([feature.value(seen) for feature in features], dim=1).to(torch.float32)
 
 
 def feature_index(feature_names: Sequence[str], name: str) -> int:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import lru_cache, partial
 
 import numpy as np
 import torch
@@ -29,7 +29,7 @@ from shotenv.decision.state import State
 from shotenv.sensor import gray_noise, incident_light, pixel_of, row_parity, sensitivity
 from unwrap.depth import RULES, dual_limits, merge_limits, shift_in_turns, turns_table
 from unwrap.signal import SensorDescription, Shots, unambiguous_range_m
-from unwrap.support import array, long_rows, put, take
+from unwrap.support import array, long_rows, mapped, put, take
 
 Array = np.ndarray
 
@@ -90,10 +90,9 @@ def _measured_by_loop(
     sensor, exposure = config.sensor, bank.exposure(frames)
     light = incident_light(exposure, drive.sensitivity)
     gray_s = problem.gray_exposure_s.take(frames)
-    noise_of_two, noise_of_more = (
-        gray_noise(gray_s, drive.integration_s, sensor, offset_left_lsb=left_lsb)
-        for left_lsb in (drive.offset_left_lsb, None)
-    )
+    known = gray_noise(gray_s, drive.integration_s, sensor, offset_left_lsb=drive.offset_left_lsb)
+    # Of more than two samples the offsets cancel.
+    none = np.zeros(len(step), np.float32)
     emitted_e = light.active_e
     if drive.is_derated(power_w):
         emitted_e = array(sensitivity(sensor, power_w, drive.integration_s).active_e)
@@ -116,20 +115,22 @@ def _measured_by_loop(
         predicted_m=rows(problem.kept.distance_of(frames)),
         pattern_lsb=rows(drive.offsets.pattern_lsb),
         calibrated_lsb=rows(drive.offsets.calibrated_lsb),
-        noise_of_two=noise_of_two,
-        noise_of_more=noise_of_more,
+        noise_of_two=known,
+        noise_of_more=known._replace(offset_variance=none, offset_per_word=none),
         shift1=shift_in_turns(0, problem.description, drive.drift_m, len(step)),
         shift2=shift_in_turns(1, problem.description, drive.drift_m, len(step)),
     )
-    lost = no_depth(len(step), sensor.max_range_m)
-    score = np.stack([getattr(lost, field.name).numpy() for field in fields(lost)])
-    error_of_four, sums = np.empty(len(step)), np.zeros((8, len(step)))
+    score, error_of_four, sums = (np.zeros((*size, len(step))) for size in ((5,), (), (8,)))
     if not score_frames_(taken, chain_of(problem), score, error_of_four, sums):
         raise ValueError(f"bank {bank.name} holds light that is NaN or infinite; render it again")
     counted = torch.from_numpy(sums)
     pixels = torch.full_like(counted[0], bank.height * bank.width)
+    found = DepthScore(*torch.from_numpy(score).unbind())
+    if not shots.all():
+        lost = no_depth(len(step), sensor.max_range_m)
+        found = mapped(partial(torch.where, shots > 0), found, lost)
     return Measurement(
-        DepthScore(*torch.from_numpy(score).unbind()),
+        found,
         torch.from_numpy(error_of_four),
         evaluated(SEEN_FEATURES, Sums(pixels, *counted.unbind())),
     )

@@ -36,7 +36,8 @@ class Scenes:
 
     def change(self, before: Tensor, now: Tensor) -> Tensor:
         """Mean absolute change of log10 ambient between bank frames [B], float32 [B]."""
-        return (self.log_ambient[now] - self.log_ambient[before]).abs_().mean(dim=1)
+        then, light = (self.log_ambient.index_select(0, frames) for frames in (before, now))
+        return light.sub_(then).abs_().mean(dim=1)
 
 
 def look_at_scenes(
