@@ -29,9 +29,11 @@ from shotenv.decision.state import State
 from shotenv.sensor import gray_noise, incident_light, pixel_of, row_parity, sensitivity
 from unwrap.depth import RULES, dual_limits, merge_limits, shift_in_turns, turns_table
 from unwrap.signal import SensorDescription, Shots, unambiguous_range_m
-from unwrap.support import array, long_rows, mapped, put, take
+from unwrap.support import array, in_parts, long_rows, mapped, put, take
 
 Array = np.ndarray
+THREAD_PIXELS = 4096
+"""Fewest pixels that are worth a thread of their own: some 0.2 ms of work."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,13 @@ def _measured_by_loop(
         shift2=shift_in_turns(1, problem.description, drive.drift_m, len(step)),
     )
     score, error_of_four, sums = (np.zeros((*size, len(step))) for size in ((5,), (), (8,)))
-    if not score_frames_(taken, chain_of(problem), score, error_of_four, sums):
+    work = taken, chain_of(problem), score, error_of_four, sums
+    finite = in_parts(
+        lambda begin, end: score_frames_(begin, end, *work),
+        len(step),
+        least=1 + THREAD_PIXELS // (bank.height * bank.width),
+    )
+    if not all(finite):
         raise ValueError(f"bank {bank.name} holds light that is NaN or infinite; render it again")
     counted = torch.from_numpy(sums)
     pixels = torch.full_like(counted[0], bank.height * bank.width)

@@ -258,7 +258,13 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
 
     @loop
     def score_frames_(
-        taken: FramesTaken, chain: Chain, score: Array, error_of_four: Array, sums: Array
+        begin: int,
+        end: int,
+        taken: FramesTaken,
+        chain: Chain,
+        score: Array,
+        error_of_four: Array,
+        sums: Array,
     ) -> bool:
         """Acquire, correct and score frames, one after the other: all of one stays in the cache.
 
@@ -267,6 +273,8 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
 
         Parameters
         ----------
+        begin, end : int
+            Frames of the batch that are worked on: threads share a batch.
         score, error_of_four, sums : float64 [5, B], [B], [8, B]
             Fields of `DepthScore`, the error term of 4 DCS with an undiminished laser, and fields
             of `features.Sums` but the pixels. Written; score and sums not where no sample is taken.
@@ -277,7 +285,7 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
             Whether all samples are finite.
         """
         used_for_the_cache_of_numba = stamp  # noqa: F841
-        frames, rows, columns = taken.truth_m.shape
+        _, rows, columns = taken.truth_m.shape
         one = (1, rows, columns)
         words = np.empty((4, BLOCK), np.uint32)
         normals = np.empty((2, 1, 2, rows * columns), np.float32)
@@ -291,7 +299,7 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
         saturated, scored = np.empty(one, np.bool_), np.empty(one, np.bool_)
         valid, finite = np.empty(one, np.bool_), True
         one_score, one_sums = np.empty((5, 1)), np.empty((8, 1))
-        for b in range(frames):
+        for b in range(begin, end):
             e = b + 1
             light, truth_m, shots = taken.light, taken.truth_m[b:e], taken.shots[b]
             derated = taken.emitted_e[b] != light.active_e[b]

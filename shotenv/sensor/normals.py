@@ -3,8 +3,8 @@
 Philox-4x32-10 (Salmon, Moraes, Dror, Shaw, Parallel Random Numbers: As Easy as 1, 2, 3, 2011)
 turns a counter and a key into four random words, which passes the usual batteries of tests for
 counters and keys that merely count up. The key is the seed; the counter names the pixel, the pair
-of samples, the frame and what the numbers are for. Box and Muller's transform (1958) makes a pair of
-normals of each two words: those of tap A and tap B of one sample.
+of samples, the frame and what the numbers are for. Box and Muller's transform (1958) makes a pair
+of normals of each two words: those of tap A and tap B of one sample.
 
 Nothing is drawn in an order, so no generator is seeded, kept or waited for. Words are integers, and
 normals are sums, products and square roots of float32 numbers: every machine has the same bits.

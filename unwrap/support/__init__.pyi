@@ -2,6 +2,7 @@ from .compiled import (
     array as array,
     array_of as array_of,
     can_loop as can_loop,
+    in_parts as in_parts,
     inlined as inlined,
     long_rows as long_rows,
     loop as loop,

@@ -9,8 +9,12 @@ bit.
 from __future__ import annotations
 
 import inspect
+import os
 import zlib
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -51,6 +55,39 @@ def loop(function: Function) -> Function:
         return numba.njit(cache=True, **options)(function)
     except RuntimeError:  # No folder can be written to: installed read-only, without a home.
         return numba.njit(**options)(function)
+
+
+def in_parts(function: Callable[[int, int], Any], count: int, *, least: int) -> list[Any]:
+    """`function` of (begin, end) for parts of 0..count, side by side on torch's number of threads.
+
+    It should be a compiled loop, which leaves Python to others, over things that do not depend on
+    each other: then the parts make no difference to the numbers.
+
+    Parameters
+    ----------
+    least : int
+        Fewest that are worth a thread.
+
+    Examples
+    --------
+    >>> in_parts(lambda begin, end: (begin, end), 3, least=5)
+    [(0, 3)]
+    """
+    import torch  # Not at the top: see above.
+
+    threads = max(min(torch.get_num_threads(), count // least), 1)
+    ends = [count * (part + 1) // threads for part in range(threads)]
+    if threads == 1:
+        return [function(0, count)]
+    pool = _pool(os.getpid(), threads - 1)
+    others = [pool.submit(function, *part) for part in pairwise(ends)]
+    return [function(0, ends[0]), *(other.result() for other in others)]
+
+
+@lru_cache(maxsize=2)
+def _pool(process: int, threads: int) -> ThreadPoolExecutor:
+    # By the process, for threads do not live on in one that is forked.
+    return ThreadPoolExecutor(threads, thread_name_prefix="shotenv")
 
 
 def source_stamp(*loops: Any) -> int:
