@@ -34,5 +34,9 @@ def observe(problem: Problem, state: State) -> Tensor:
         laser_power_w=drive.laser_power_w,
         integration_s=drive.integration_s,
     )
-    parts = problem.scenes.features[frame], seen.features, evaluated(STATE_FEATURES, now)
+    parts = (
+        problem.scenes.features.index_select(0, frame),
+        seen.features,
+        evaluated(STATE_FEATURES, now),
+    )
     return torch.cat(parts, dim=1).clamp_(-LIMIT, LIMIT)
