@@ -1,8 +1,8 @@
 """`docs/problem.md`, its picture and the README's table, from what `shotenv problem` measured.
 
-for preset in default hot battery night_shift paper: shotenv problem
---env configs/env/PRESET.yaml --json DIR/PRESET.json (--goals hot for hot); then
-`python docs/problem_page.py DIR`. It keeps what the page needs in `docs/problem/`; without DIR it
+for preset in default hot battery night_shift paper strong: shotenv problem
+--env configs/env/PRESET.yaml --json DIR/PRESET.json (--goals hot for hot); `python docs/learnability.py --json DIR/learnability.json`;
+then `python docs/problem_page.py DIR`. It keeps what the page needs in `docs/problem/`; without DIR it
 writes the page from there. The picture needs matplotlib.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,8 @@ PAGE = DOCS / "problem.md"
 PICTURE = DOCS / "images" / "problem.png"
 README = DOCS.parent / "README.md"
 NUMBERS = DOCS / "problem"
-PRESETS = ("default", "hot", "battery", "night_shift", "paper")
+PRESETS = ("default", "hot", "battery", "night_shift", "paper", "strong")
+LEARNERS = "learnability"
 UNUSED = ("frame_explains", "sweep")
 """What `shotenv problem` tells beside what is on the page."""
 ROWS = {
@@ -158,17 +160,50 @@ HEAD = """# What there is to win
 Made by `python docs/problem_page.py DIR` from what
 `shotenv problem --env configs/env/PRESET.yaml --json DIR/PRESET.json` measures
 (kept in `docs/problem/`, from which it is made without `DIR`): every action in
-every frame of the test drives of the bank `pocket`, with the drive's own noise, and from these
+every frame of the test drives of the bank `pocket` (`strong`: `starter`), with the drive's own noise, and from these
 tables what policies that know everything, nothing, or what the sensor tells could reach. Cost is
 the weighted sum of the reward's terms; intervals are 95 % bootstrap intervals over clips. Foresight
 is a small network that foresees each action's error from gray image, unwrapping network and the
 drive's settings, trained on train drives, told what looking showed (how far 2 and 4 of the 8
 samples of the last frame were from all of them) or not. The goals are those of the default problem,
 or for `hot` of one in which heat binds; the other presets are what they are for and need not meet
-them. `configs/env/strong.yaml`, which needs a rendered bank, is not on this page.
+them. At the end stands what plain learners make of the default problem.
 
 ![Error against laser energy by preset; dots are always 2, 4 and 8 DCS](images/problem.png)
 """
+
+
+def learners(found: dict[str, Any]) -> str:
+    """What agents of stable-baselines3 with library defaults learn."""
+    rows = [
+        "| | over always 2 | over always 4 | over always 8 | over itself without looking | error | "
+        "2 / 4 / 8 DCS |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for run in found["runs"]:
+        pairs = [*run["over"].values(), run["over_itself_without_looking"]]
+        differences = " | ".join(difference(one) for one in pairs)
+        shares = " / ".join(percent(one) for one in run["shots_share"])
+        rows.append(
+            f"| {run['algorithm']}, seed {run['seed']} | {differences} | "
+            f"{run['depth_mae_m']:.2f} m | {shares} |"
+        )
+    return "\n\n".join(
+        [
+            "## Plain learners",
+            "PPO and DQN of stable-baselines3 with the library's defaults but for the discount, "
+            f"trained for {found['steps']:,} frames of one environment (`python "
+            f"docs/learnability.py`), on {found['drives']} test drives: difference of the return "
+            "of a drive, with its 95 % interval over clips. Without looking, the features that "
+            "tell what a longer acquisition showed are 0.",
+            "\n".join(rows),
+        ]
+    )
+
+
+def difference(one: dict[str, float]) -> str:
+    """A difference of returns and its interval."""
+    return f"{one['difference']:+.0f} ({one['low']:+.0f} to {one['high']:+.0f})"
 
 
 def keep_numbers(folder: Path) -> None:
@@ -176,22 +211,26 @@ def keep_numbers(folder: Path) -> None:
     NUMBERS.mkdir(exist_ok=True)
     for preset in PRESETS:
         found = json.loads((folder / f"{preset}.json").read_text(encoding="utf-8"))
-        kept = {name: value for name, value in found.items() if name not in UNUSED}
-        text = json.dumps(kept, indent=1) + "\n"
+        used = {name: value for name, value in found.items() if name not in UNUSED}
+        text = json.dumps(used, indent=1) + "\n"
         (NUMBERS / f"{preset}.json").write_text(text, encoding="utf-8")
+    shutil.copyfile(folder / f"{LEARNERS}.json", NUMBERS / f"{LEARNERS}.json")
+
+
+def kept(name: str) -> dict[str, Any]:
+    """The numbers kept under a name."""
+    return json.loads((NUMBERS / f"{name}.json").read_text(encoding="utf-8"))
 
 
 def measured() -> dict[str, dict[str, Any]]:
     """The numbers kept of each preset."""
-    return {
-        preset: json.loads((NUMBERS / f"{preset}.json").read_text(encoding="utf-8"))
-        for preset in PRESETS
-    }
+    return {preset: kept(preset) for preset in PRESETS}
 
 
-def page(found: dict[str, dict[str, Any]]) -> str:
+def page(found: dict[str, dict[str, Any]], learned: dict[str, Any]) -> str:
     """The page of these numbers."""
-    return "\n\n".join([HEAD.rstrip(), *(section(*item) for item in found.items())]) + "\n"
+    sections = [section(*item) for item in found.items()]
+    return "\n\n".join([HEAD.rstrip(), *sections, learners(learned)]) + "\n"
 
 
 def filled_readme(text: str, found: dict[str, Any]) -> str:
@@ -223,7 +262,7 @@ def main() -> None:
     if len(sys.argv) > 1:
         keep_numbers(Path(sys.argv[1]))
     found = measured()
-    PAGE.write_text(page(found), encoding="utf-8")
+    PAGE.write_text(page(found, kept(LEARNERS)), encoding="utf-8")
     readme = filled_readme(README.read_text(encoding="utf-8"), found["default"])
     README.write_text(readme, encoding="utf-8")
     paint(found)

@@ -23,7 +23,9 @@ def script():
 
 
 def test_the_page_says_what_was_measured(script):
-    assert script.PAGE.read_text(encoding="utf-8") == script.page(script.measured())
+    assert script.PAGE.read_text(encoding="utf-8") == script.page(
+        script.measured(), script.kept(script.LEARNERS)
+    )
 
 
 def test_the_readme_says_what_was_measured(script):
@@ -53,6 +55,12 @@ def test_the_goals_are_those_of_today(script):
         assert bounds == {n: (g["least"], g.get("most")) for n, g in found["goals"].items()}
 
 
-def test_every_preset_but_the_strong_one_is_on_the_page(script):
+def test_every_preset_is_on_the_page(script):
     presets = {path.stem for path in (configs_dir() / "env").glob("*.yaml")}
-    assert presets - {"strong"} == set(script.PRESETS)
+    assert presets == set(script.PRESETS)
+
+
+def test_plain_learners_were_measured_to_beat_every_fixed_choice(script):
+    runs = script.kept(script.LEARNERS)["runs"]
+    assert {run["algorithm"] for run in runs} == {"PPO", "DQN"}
+    assert all(one["low"] > 0.0 for run in runs for one in run["over"].values())
