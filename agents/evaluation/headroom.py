@@ -176,7 +176,7 @@ def _at_half_energy(fronts: dict[str, Front], study: StudyConfig) -> dict[str, A
         return resampled(of, clusters, study).named("mean")
 
     def error_of(front: Front) -> Callable[[np.ndarray], float]:
-        return lambda weight: float(front.error_at(HALF, weight))
+        return lambda weight: front.error_at(HALF, weight)
 
     def energy_of(front: Front) -> Callable[[np.ndarray], float]:
         blind = fronts["best_blind"]

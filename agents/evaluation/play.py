@@ -114,7 +114,6 @@ def play_drives(
     envs: VectorEnv,
     seeds: Sequence[int],
     *,
-    price: float | None = None,
     tick: Callable[[int], object] = lambda frames: None,
 ) -> PlayedDrives:
     """Drive one drive per environment, all at once, to the end.
@@ -127,14 +126,11 @@ def play_drives(
         As many environments as `seeds`, in any autoreset mode.
     seeds : sequence of int
         Seed of each drive.
-    price : float, optional
-        Weight of power in all drives; each drive's own by default.
     tick : callable
         Told the number of frames driven after each step.
     """
     one_each: Any = list(seeds)  # gymnasium's annotation forgets sequences
-    options = None if price is None else {"power_price": price}
-    observations, infos = envs.reset(seed=one_each, options=options)
+    observations, infos = envs.reset(seed=one_each)
     policy.reset()
     unwrapped: Any = envs.unwrapped  # gymnasium's annotation does not know our attributes
     families = np.array(unwrapped.family_names)

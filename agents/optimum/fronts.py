@@ -21,7 +21,7 @@ PRICES = np.concatenate(([0.0], np.geomspace(1e-4, 4.0, 60)))
 
 @dataclass(frozen=True)
 class Front:
-    """Points of a front, summed clip by clip: C clips, L points in any order.
+    """Points of a front, summed clip by clip: C clips, L points with rising energy.
 
     Attributes
     ----------
@@ -36,49 +36,22 @@ class Front:
     frames: np.ndarray
 
     def points(self, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean energy, rising, and error of each point, [L].
-
-        Each clip counts `weight` [C] times.
-        """
+        """Mean energy and error of each point, [L], with each clip counted `weight` [C] times."""
         frames = weight @ self.frames
-        energy, error = weight @ self.energy / frames, weight @ self.depth_mae_m / frames
-        rising = np.argsort(energy, kind="stable")
-        return energy[rising], error[rising]
+        return weight @ self.energy / frames, weight @ self.depth_mae_m / frames
 
-    def hull(self, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Least mean error at each mean energy, by mixing any two points over time.
-
-        The corners of the lower convex hull, energy rising and error falling.
-        """
-        corners: list[tuple[float, float]] = []
-        for point in zip(*self.points(weight), strict=True):
-            # A corner goes that lies on or above the line from the one before it to this point.
-            while len(corners) > 1 and not _below_line(corners[-1], corners[-2], point):
-                corners.pop()
-            corners.append(point)
-        energy, error = np.array(corners).T
-        # Beyond the least error more energy buys nothing.
-        last = int(np.argmin(error)) + 1
-        return energy[:last], error[:last]
-
-    def error_at(self, energy: float | np.ndarray, weight: np.ndarray) -> np.ndarray:
-        """Mean error at mean energies, metres."""
-        return np.interp(energy, *self.hull(weight))
+    def error_at(self, energy: float, weight: np.ndarray) -> float:
+        """Mean error at a mean energy, metres; between two points they are mixed."""
+        return float(np.interp(energy, *self.points(weight)))
 
     def energy_at(self, depth_mae_m: float, weight: np.ndarray) -> float:
         """Least mean energy at which the mean error is no more than `depth_mae_m`; 1 at most."""
-        energy, error = self.hull(weight)
-        if depth_mae_m < error[-1]:
+        energy, error = self.points(weight)
+        # Along a front the error falls but for noise; running minima make it fall for certain.
+        falling = np.minimum.accumulate(error)
+        if depth_mae_m < falling[-1]:
             return 1.0
-        return float(np.interp(-depth_mae_m, -error, energy))
-
-
-def _below_line(
-    corner: tuple[float, float], before: tuple[float, float], after: tuple[float, float]
-) -> bool:
-    """Whether `corner` lies below the line through its neighbours, energies rising."""
-    (x0, y0), (x1, y1), (x2, y2) = before, corner, after
-    return (y1 - y0) * (x2 - x0) < (y2 - y0) * (x1 - x0)
+        return float(np.interp(-depth_mae_m, -falling, energy))
 
 
 def front_of(costs: np.ndarray, table: DriveTable, clips: np.ndarray) -> Front:
@@ -101,8 +74,12 @@ def front_of(costs: np.ndarray, table: DriveTable, clips: np.ndarray) -> Front:
 def blind_front(table: DriveTable, clips: np.ndarray) -> Front:
     """The front of choices that look at nothing: 2, 4 or 8 DCS drawn with fixed probabilities."""
     shape = table.depth_mae_m.shape
-    # Mixing 2 and 8 DCS may be better than 4; then 4 is no corner of the front.
-    return _summed(np.broadcast_to(ENERGY, shape), table.depth_mae_m, clips)
+    whole = _summed(np.broadcast_to(ENERGY, shape), table.depth_mae_m, clips)
+    _, error = whole.points(np.ones(len(whole.frames)))
+    # Mixing 2 and 8 DCS may be better than 4; then 4 is no point of the front.
+    mixed = np.interp(ENERGY[1], ENERGY[[0, 2]], error[[0, 2]])
+    points = [0, 1, 2] if error[1] <= mixed else [0, 2]
+    return Front(whole.energy[:, points], whole.depth_mae_m[:, points], whole.frames)
 
 
 def by_clip(values: np.ndarray, clips: np.ndarray) -> np.ndarray:
