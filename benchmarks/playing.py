@@ -90,7 +90,8 @@ def processes() -> list[dict]:
     native = player(ShotScheduleVectorEnv(DRIVES), STEPS)
     rows = []
     actions = np.random.default_rng(0).integers(0, 3, (997, count))
-    makers = [lambda: gymnasium.make(ENV_ID)] * count
+    # Processes that are spawned have not imported `shotenv`; the name makes gymnasium do it.
+    makers = [lambda: gymnasium.make(f"shotenv:{ENV_ID}")] * count
     for name, make in (
         ("SubprocVecEnv", lambda: SubprocVecEnv(makers, start_method="spawn")),
         (
