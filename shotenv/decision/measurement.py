@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 import torch
@@ -136,7 +136,7 @@ def _measured_by_loop(
     found = DepthScore(*torch.from_numpy(score).unbind())
     if not shots.all():
         lost = no_depth(len(step), sensor.max_range_m)
-        found = mapped(partial(torch.where, shots > 0), found, lost)
+        found = mapped(lambda one, other: torch.where(shots > 0, one, other), found, lost)
     return Measurement(
         found,
         torch.from_numpy(error_of_four),
