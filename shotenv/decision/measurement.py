@@ -14,17 +14,9 @@ from shotenv.config import EnvConfig
 from shotenv.decision.acquire import Acquisition, acquire_depths
 from shotenv.decision.drive import Drive
 from shotenv.decision.features import SEEN_FEATURES, TOLD, Sums, evaluated
+from shotenv.decision.frame_loop import Chain, FramesTaken, score_frames_
 from shotenv.decision.problem import Problem
-from shotenv.decision.score import (
-    SUMMED,
-    Chain,
-    DepthScore,
-    FramesTaken,
-    no_depth,
-    score_depth,
-    score_frames_,
-    sum_pixels_,
-)
+from shotenv.decision.score import SUMMED, DepthScore, no_depth, score_depth, sum_pixels_
 from shotenv.decision.state import State
 from shotenv.sensor import gray_noise, incident_light, pixel_of, row_parity, sensitivity
 from unwrap.depth import RULES, dual_limits, merge_limits, shift_in_turns, turns_table
