@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 import torch
@@ -14,17 +14,9 @@ from shotenv.config import EnvConfig
 from shotenv.decision.acquire import Acquisition, acquire_depths
 from shotenv.decision.drive import Drive
 from shotenv.decision.features import SEEN_FEATURES, TOLD, Sums, evaluated
+from shotenv.decision.frame_loop import Chain, FramesTaken, score_frames_
 from shotenv.decision.problem import Problem
-from shotenv.decision.score import (
-    SUMMED,
-    Chain,
-    DepthScore,
-    FramesTaken,
-    no_depth,
-    score_depth,
-    score_frames_,
-    sum_pixels_,
-)
+from shotenv.decision.score import SUMMED, DepthScore, no_depth, score_depth, sum_pixels_
 from shotenv.decision.state import State
 from shotenv.sensor import gray_noise, incident_light, pixel_of, row_parity, sensitivity
 from unwrap.depth import RULES, dual_limits, merge_limits, shift_in_turns, turns_table
@@ -136,7 +128,7 @@ def _measured_by_loop(
     found = DepthScore(*torch.from_numpy(score).unbind())
     if not shots.all():
         lost = no_depth(len(step), sensor.max_range_m)
-        found = mapped(partial(torch.where, shots > 0), found, lost)
+        found = mapped(lambda one, other: torch.where(shots > 0, one, other), found, lost)
     return Measurement(
         found,
         torch.from_numpy(error_of_four),

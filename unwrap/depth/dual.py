@@ -134,9 +134,15 @@ def dual_limits(sensor: SensorDescription) -> DualLimits:
     last = math.floor(sensor.max_range_m / range1_m)
     share2 = sensor.f2_hz**2 / (sensor.f1_hz**2 + sensor.f2_hz**2)
     ends_m = sensor.max_range_m - last * range1_m if last else float(FAR)
-    numbers = map(np.float32, (range1_m, range2_m, share2))
-    limits = map(np.float32, (ends_m, sensor.max_residual_m, sensor.min_snr))
-    return DualLimits(*numbers, last, *limits)
+    return DualLimits(
+        range1_m=np.float32(range1_m),
+        range2_m=np.float32(range2_m),
+        share2=np.float32(share2),
+        last=last,
+        last_ends_m=np.float32(ends_m),
+        max_residual_m=np.float32(sensor.max_residual_m),
+        min_snr=np.float32(sensor.min_snr),
+    )
 
 
 @loop

@@ -1,0 +1,280 @@
+"""From light to scores in one compiled loop, frame by frame: what a step spends its time in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from shotenv.decision.score import score_pixels_, sum_pixels_
+from shotenv.sensor import (
+    BLOCK,
+    GrayNoise,
+    IncidentLight,
+    Pixel,
+    Purpose,
+    fill_normals_,
+    mark_scored_,
+    noise_by_gray_,
+    take_sample_,
+)
+from unwrap.depth import DualLimits, Limits, fuse_pixels, merge_pixels
+from unwrap.signal import TurnsTable, angle_pixels, decode_pixels
+from unwrap.support import loop, source_stamp
+
+Array = np.ndarray
+NOISE = int(Purpose.NOISE)
+
+
+class FramesTaken(NamedTuple):
+    """What differs from frame to frame of a batch; maps are [B, H, W].
+
+    Attributes
+    ----------
+    shots, seeds, steps : int64 [B]
+        Samples taken, 0, 2, 4 or 8; what the noise is drawn by.
+    light : IncidentLight
+        With the drives' own laser power.
+    emitted_e : float32 [B]
+        As `light.active_e`, with the power that is emitted.
+    truth_m, gray, predicted_m, pattern_lsb, calibrated_lsb
+        True distance; words of the gray image; the network's distance; offset, and what is stored.
+    noise_of_two, noise_of_more : GrayNoise
+        Of a sample among two, and among more.
+    shift1, shift2 : float32 [B]
+        Turns that are added at f1 and f2.
+    """
+
+    shots: Array
+    seeds: Array
+    steps: Array
+    light: IncidentLight
+    emitted_e: Array
+    truth_m: Array
+    gray: Array
+    predicted_m: Array
+    pattern_lsb: Array
+    calibrated_lsb: Array
+    noise_of_two: GrayNoise
+    noise_of_more: GrayNoise
+    shift1: Array
+    shift2: Array
+
+
+class Chain(NamedTuple):
+    """Constants of the way from light to scores.
+
+    Attributes
+    ----------
+    parity, pixel, range_m, min_snr
+        Of the sensor: see `take_sample_` and `mark_scored_`.
+    table1, table2, limits, branch, dual
+        Of the correction: see `merge_pixels` and `fuse_pixels`.
+    fuses : bool
+        Whether the frequencies of eight samples tell the wraps; else the prediction does.
+    scale_m, near_m, worst_m
+        Of the score: see `score_pixels_`.
+    """
+
+    parity: Array
+    pixel: Pixel
+    range_m: np.float32
+    min_snr: np.float32
+    table1: TurnsTable
+    table2: TurnsTable
+    limits: Limits
+    branch: int
+    dual: DualLimits
+    fuses: bool
+    scale_m: np.float32
+    near_m: np.float32
+    worst_m: float
+
+
+def _frame_loop(stamp: int) -> Callable[..., bool]:
+    """The loop `score_frames_`; `stamp` is that of the loops that it calls."""
+
+    @loop
+    def score_frames_(
+        begin: int,
+        end: int,
+        taken: FramesTaken,
+        chain: Chain,
+        score: Array,
+        error_of_four: Array,
+        sums: Array,
+    ) -> bool:
+        """Acquire, correct and score frames, one after the other: all of one stays in the cache.
+
+        The same loops in the same order as `acquire_depths`, `correct`, `score_depth` and
+        `sums_of`, which keep the maps; a test holds them together to the last bit.
+
+        Parameters
+        ----------
+        begin, end : int
+            Frames of the batch that are worked on: threads share a batch.
+        score, error_of_four, sums : float64 [5, B], [B], [8, B]
+            Fields of `DepthScore`, the error term of 4 DCS with an undiminished laser, and fields
+            of `features.Sums` but the pixels. Written; score and sums not where no sample is taken.
+
+        Returns
+        -------
+        bool
+            Whether all samples are finite.
+        """
+        used_for_the_cache_of_numba = stamp  # noqa: F841
+        _, rows, columns = taken.truth_m.shape
+        one = (1, rows, columns)
+        words = np.empty((4, BLOCK), np.uint32)
+        normals = np.empty((2, 1, 2, rows * columns), np.float32)
+        samples = np.empty((8, rows, columns), np.float32)
+        no_offset, noise = np.zeros(one, np.float32), np.empty(one, np.float32)
+        cosine, sine = np.empty(one, np.float32), np.empty(one, np.float32)
+        amplitude, residual = np.empty(one, np.float32), np.empty(one, np.float32)
+        cosine2, amplitude2 = np.empty(one, np.float32), np.empty(one, np.float32)
+        residual2 = np.empty(one, np.float32)
+        distances = np.empty((3, 1, rows, columns), np.float32)
+        saturated, scored = np.empty(one, np.bool_), np.empty(one, np.bool_)
+        valid, finite = np.empty(one, np.bool_), True
+        one_score, one_sums = np.empty((5, 1)), np.empty((8, 1))
+        for b in range(begin, end):
+            e = b + 1
+            light, truth_m, shots = taken.light, taken.truth_m[b:e], taken.shots[b]
+            derated = taken.emitted_e[b] != light.active_e[b]
+            own = IncidentLight(
+                light.correlation[b:e],
+                light.active[b:e],
+                light.ambient[b:e],
+                light.active_e[b:e],
+                light.ambient_e[b:e],
+            )
+            mark_scored_(own, chain.pixel, truth_m, chain.range_m, chain.min_snr, scored)
+            # Once with what is emitted, and after that with the undiminished laser of the
+            # reward's reference, if it differs.
+            for derates in (True, False):
+                if derates and not (derated and shots):
+                    continue
+                emitted_e = taken.emitted_e[b:e] if derates else light.active_e[b:e]
+                lit = IncidentLight(
+                    own.correlation, own.active, own.ambient, emitted_e, own.ambient_e
+                )
+                counts = derates or not derated
+                last = max(shots, 4) if counts else 4
+                saturated[:] = False
+                for number in range(last):
+                    if number % 2 == 0:
+                        fill_normals_(
+                            NOISE, taken.seeds[b:e], taken.steps[b:e], number // 2, words, normals
+                        )
+                    take_sample_(
+                        number,
+                        lit,
+                        normals[number % 2].reshape((1, 2, rows, columns)),
+                        taken.pattern_lsb[b:e],
+                        chain.parity,
+                        chain.pixel,
+                        samples.reshape((1, 8, rows, columns)),
+                        saturated,
+                    )
+                    count = number + 1
+                    if count != 2 and count != 4 and count != 8:
+                        continue
+                    known = taken.noise_of_two if count == 2 else taken.noise_of_more
+                    noise_by_gray_(
+                        taken.gray[b:e],
+                        known.variance_per_word[b:e],
+                        known.dark,
+                        known.offset_variance[b:e],
+                        known.offset_per_word[b:e],
+                        known.most_offset,
+                        noise,
+                    )
+                    # Two samples hold the offset; see `offset_to_subtract_lsb`.
+                    offset_lsb = taken.calibrated_lsb[b:e] if count == 2 else no_offset
+                    at_f1 = min(count, 4)
+                    finite &= decode_pixels(
+                        samples[:at_f1].reshape((1, at_f1, rows, columns)),
+                        offset_lsb,
+                        cosine,
+                        sine,
+                        amplitude,
+                        residual,
+                    )
+                    angle_pixels(sine.reshape(-1), cosine.reshape(-1), cosine.reshape(-1))
+                    place = 0 if count == 2 else (1 if count == 4 else 2)
+                    distance_m = distances[place]
+                    merge_pixels(
+                        cosine,
+                        chain.table1,
+                        taken.shift1[b:e],
+                        amplitude,
+                        noise,
+                        saturated,
+                        taken.predicted_m[b:e],
+                        chain.limits,
+                        chain.branch,
+                        distance_m,
+                        valid,
+                    )
+                    told = amplitude if count == 2 else residual
+                    if count == 8 and chain.fuses:
+                        finite &= decode_pixels(
+                            samples[4:].reshape((1, 4, rows, columns)),
+                            no_offset,
+                            cosine2,
+                            sine,
+                            amplitude2,
+                            residual2,
+                        )
+                        angle_pixels(sine.reshape(-1), cosine2.reshape(-1), cosine2.reshape(-1))
+                        fuse_pixels(
+                            cosine,
+                            cosine2,
+                            chain.table2,
+                            taken.shift2[b:e],
+                            amplitude2,
+                            noise,
+                            valid,
+                            chain.dual,
+                            distance_m,
+                        )
+                    is_reference = count == 4 and not derates
+                    if not is_reference and not (counts and count == shots):
+                        continue
+                    score_pixels_(
+                        distance_m,
+                        valid,
+                        truth_m,
+                        scored,
+                        chain.scale_m,
+                        chain.near_m,
+                        chain.worst_m,
+                        one_score,
+                    )
+                    if is_reference:
+                        error_of_four[b] = one_score[0, 0]
+                    if counts and count == shots:
+                        sum_pixels_(
+                            amplitude,
+                            told,
+                            noise,
+                            valid,
+                            saturated,
+                            distance_m,
+                            distances[0],
+                            distances[min(place, 1)],
+                            chain.scale_m,
+                            one_sums,
+                        )
+                        score[:, b], sums[:, b] = one_score[:, 0], one_sums[:, 0]
+        return finite
+
+    return score_frames_
+
+
+score_frames_ = _frame_loop(
+    source_stamp(
+        fill_normals_, take_sample_, decode_pixels, merge_pixels, fuse_pixels, score_pixels_
+    )
+)
