@@ -125,7 +125,9 @@ def main() -> None:
             found.append(measure(algorithm, seed))
             print(json.dumps(found[-1]), flush=True)
     if arguments.json:
-        arguments.json.write_text(json.dumps({"steps": STEPS, "drives": DRIVES, "runs": found}, indent=1) + "\n")
+        arguments.json.write_text(
+            json.dumps({"steps": STEPS, "drives": DRIVES, "runs": found}, indent=1) + "\n"
+        )
 
 
 if __name__ == "__main__":

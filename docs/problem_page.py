@@ -1,8 +1,11 @@
-"""`docs/problem.md`, its picture and the README's table, from what `shotenv problem` measured.
+"""`docs/problem.md`, its picture and the README's table, from what was measured.
 
-for preset in default hot battery night_shift paper strong: shotenv problem
---env configs/env/PRESET.yaml --json DIR/PRESET.json (--goals hot for hot); `python docs/learnability.py --json DIR/learnability.json`;
-then `python docs/problem_page.py DIR`. It keeps what the page needs in `docs/problem/`; without DIR it
+Into one folder DIR, for each of the presets default hot battery night_shift paper strong:
+
+shotenv problem --env configs/env/PRESET.yaml --json DIR/PRESET.json (--goals hot for hot)
+python docs/learnability.py --json DIR/learnability.json
+
+Then `python docs/problem_page.py DIR` keeps what the page needs in `docs/problem/`; without DIR it
 writes the page from there. The picture needs matplotlib.
 """
 
@@ -160,8 +163,8 @@ HEAD = """# What there is to win
 Made by `python docs/problem_page.py DIR` from what
 `shotenv problem --env configs/env/PRESET.yaml --json DIR/PRESET.json` measures
 (kept in `docs/problem/`, from which it is made without `DIR`): every action in
-every frame of the test drives of the bank `pocket` (`strong`: `starter`), with the drive's own noise, and from these
-tables what policies that know everything, nothing, or what the sensor tells could reach. Cost is
+every frame of the test drives of the bank `pocket` (`strong`: `starter`), with the drive's own
+noise, and from these tables what policies that know everything, nothing, or what the sensor tells could reach. Cost is
 the weighted sum of the reward's terms; intervals are 95 % bootstrap intervals over clips. Foresight
 is a small network that foresees each action's error from gray image, unwrapping network and the
 drive's settings, trained on train drives, told what looking showed (how far 2 and 4 of the 8

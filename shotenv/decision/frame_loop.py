@@ -92,6 +92,87 @@ class Chain(NamedTuple):
     worst_m: float
 
 
+class Room(NamedTuple):
+    """Memory for the maps of one frame, each [1, H, W] but where told, and views of it.
+
+    Views are made here and not in the loop, where they would take seconds to compile.
+
+    Attributes
+    ----------
+    words, normals, normals_in_rows
+        Random words; normals [2, 1, 2, H, W] of two samples, and as [2, 1, 2, H W].
+    samples, of_two, of_four, at_f2
+        Eight samples [1, 8, H, W]; the first two, the first four, the last four of them.
+    cosine_row, sine_row, cosine2_row : [H W]
+        `cosine`, `sine`, `cosine2`.
+    distances : [3, 1, H, W]
+        Of the first two, the first four and all samples.
+    score, sums : [5, 1], [8, 1]
+    """
+
+    words: Array
+    normals: Array
+    normals_in_rows: Array
+    samples: Array
+    of_two: Array
+    of_four: Array
+    at_f2: Array
+    no_offset: Array
+    noise: Array
+    cosine: Array
+    sine: Array
+    cosine2: Array
+    cosine_row: Array
+    sine_row: Array
+    cosine2_row: Array
+    amplitude: Array
+    residual: Array
+    amplitude2: Array
+    residual2: Array
+    distances: Array
+    saturated: Array
+    scored: Array
+    valid: Array
+    score: Array
+    sums: Array
+
+
+def room_for(rows: int, columns: int) -> Room:
+    """Memory for frames of `rows` x `columns` pixels."""
+    one = (1, rows, columns)
+    normals = np.empty((2, 1, 2, rows, columns), np.float32)
+    samples = np.empty((1, 8, rows, columns), np.float32)
+    cosine, sine, cosine2 = (np.empty(one, np.float32) for _ in range(3))
+    return Room(
+        words=np.empty((4, BLOCK), np.uint32),
+        normals=normals,
+        normals_in_rows=normals.reshape(2, 1, 2, -1),
+        samples=samples,
+        # Without copying: slices of the first axis lie in one piece.
+        of_two=samples[0, :2][None],
+        of_four=samples[0, :4][None],
+        at_f2=samples[0, 4:][None],
+        no_offset=np.zeros(one, np.float32),
+        noise=np.empty(one, np.float32),
+        cosine=cosine,
+        sine=sine,
+        cosine2=cosine2,
+        cosine_row=cosine.reshape(-1),
+        sine_row=sine.reshape(-1),
+        cosine2_row=cosine2.reshape(-1),
+        amplitude=np.empty(one, np.float32),
+        residual=np.empty(one, np.float32),
+        amplitude2=np.empty(one, np.float32),
+        residual2=np.empty(one, np.float32),
+        distances=np.empty((3, 1, rows, columns), np.float32),
+        saturated=np.empty(one, np.bool_),
+        scored=np.empty(one, np.bool_),
+        valid=np.empty(one, np.bool_),
+        score=np.empty((5, 1)),
+        sums=np.empty((8, 1)),
+    )
+
+
 def _frame_loop(stamp: int) -> Callable[..., bool]:
     """The loop `score_frames_`; `stamp` is that of the loops that it calls."""
 
@@ -101,6 +182,7 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
         end: int,
         taken: FramesTaken,
         chain: Chain,
+        room: Room,
         score: Array,
         error_of_four: Array,
         sums: Array,
@@ -114,6 +196,8 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
         ----------
         begin, end : int
             Frames of the batch that are worked on: threads share a batch.
+        room : Room
+            To write in; each thread has its own.
         score, error_of_four, sums : float64 [5, B], [B], [8, B]
             Fields of `DepthScore`, the error term of 4 DCS with an undiminished laser, and fields
             of `features.Sums` but the pixels. Written; score and sums not where no sample is taken.
@@ -124,20 +208,11 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
             Whether all samples are finite.
         """
         used_for_the_cache_of_numba = stamp  # noqa: F841
-        _, rows, columns = taken.truth_m.shape
-        one = (1, rows, columns)
-        words = np.empty((4, BLOCK), np.uint32)
-        normals = np.empty((2, 1, 2, rows * columns), np.float32)
-        samples = np.empty((8, rows, columns), np.float32)
-        no_offset, noise = np.zeros(one, np.float32), np.empty(one, np.float32)
-        cosine, sine = np.empty(one, np.float32), np.empty(one, np.float32)
-        amplitude, residual = np.empty(one, np.float32), np.empty(one, np.float32)
-        cosine2, amplitude2 = np.empty(one, np.float32), np.empty(one, np.float32)
-        residual2 = np.empty(one, np.float32)
-        distances = np.empty((3, 1, rows, columns), np.float32)
-        saturated, scored = np.empty(one, np.bool_), np.empty(one, np.bool_)
-        valid, finite = np.empty(one, np.bool_), True
-        one_score, one_sums = np.empty((5, 1)), np.empty((8, 1))
+        finite = True
+        saturated, scored, valid = room.saturated, room.scored, room.valid
+        noise, distances = room.noise, room.distances
+        cosine, sine, cosine2 = room.cosine, room.sine, room.cosine2
+        amplitude, residual, amplitude2 = room.amplitude, room.residual, room.amplitude2
         for b in range(begin, end):
             e = b + 1
             light, truth_m, shots = taken.light, taken.truth_m[b:e], taken.shots[b]
@@ -165,16 +240,21 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
                 for number in range(last):
                     if number % 2 == 0:
                         fill_normals_(
-                            NOISE, taken.seeds[b:e], taken.steps[b:e], number // 2, words, normals
+                            NOISE,
+                            taken.seeds[b:e],
+                            taken.steps[b:e],
+                            number // 2,
+                            room.words,
+                            room.normals_in_rows,
                         )
                     take_sample_(
                         number,
                         lit,
-                        normals[number % 2].reshape((1, 2, rows, columns)),
+                        room.normals[number % 2],
                         taken.pattern_lsb[b:e],
                         chain.parity,
                         chain.pixel,
-                        samples.reshape((1, 8, rows, columns)),
+                        room.samples,
                         saturated,
                     )
                     count = number + 1
@@ -191,17 +271,16 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
                         noise,
                     )
                     # Two samples hold the offset; see `offset_to_subtract_lsb`.
-                    offset_lsb = taken.calibrated_lsb[b:e] if count == 2 else no_offset
-                    at_f1 = min(count, 4)
+                    offset_lsb = taken.calibrated_lsb[b:e] if count == 2 else room.no_offset
                     finite &= decode_pixels(
-                        samples[:at_f1].reshape((1, at_f1, rows, columns)),
+                        room.of_two if count == 2 else room.of_four,
                         offset_lsb,
                         cosine,
                         sine,
                         amplitude,
                         residual,
                     )
-                    angle_pixels(sine.reshape(-1), cosine.reshape(-1), cosine.reshape(-1))
+                    angle_pixels(room.sine_row, room.cosine_row, room.cosine_row)
                     place = 0 if count == 2 else (1 if count == 4 else 2)
                     distance_m = distances[place]
                     merge_pixels(
@@ -220,14 +299,14 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
                     told = amplitude if count == 2 else residual
                     if count == 8 and chain.fuses:
                         finite &= decode_pixels(
-                            samples[4:].reshape((1, 4, rows, columns)),
-                            no_offset,
+                            room.at_f2,
+                            room.no_offset,
                             cosine2,
                             sine,
                             amplitude2,
-                            residual2,
+                            room.residual2,
                         )
-                        angle_pixels(sine.reshape(-1), cosine2.reshape(-1), cosine2.reshape(-1))
+                        angle_pixels(room.sine_row, room.cosine2_row, room.cosine2_row)
                         fuse_pixels(
                             cosine,
                             cosine2,
@@ -250,10 +329,10 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
                         chain.scale_m,
                         chain.near_m,
                         chain.worst_m,
-                        one_score,
+                        room.score,
                     )
                     if is_reference:
-                        error_of_four[b] = one_score[0, 0]
+                        error_of_four[b] = room.score[0, 0]
                     if counts and count == shots:
                         sum_pixels_(
                             amplitude,
@@ -265,9 +344,13 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
                             distances[0],
                             distances[min(place, 1)],
                             chain.scale_m,
-                            one_sums,
+                            room.sums,
                         )
-                        score[:, b], sums[:, b] = one_score[:, 0], one_sums[:, 0]
+                        # One by one: assigning slices would take seconds to compile.
+                        for k in range(len(score)):
+                            score[k, b] = room.score[k, 0]
+                        for k in range(len(sums)):
+                            sums[k, b] = room.sums[k, 0]
         return finite
 
     return score_frames_

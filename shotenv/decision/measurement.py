@@ -14,7 +14,7 @@ from shotenv.config import EnvConfig
 from shotenv.decision.acquire import Acquisition, acquire_depths
 from shotenv.decision.drive import Drive
 from shotenv.decision.features import SEEN_FEATURES, TOLD, Sums, evaluated
-from shotenv.decision.frame_loop import Chain, FramesTaken, score_frames_
+from shotenv.decision.frame_loop import Chain, FramesTaken, room_for, score_frames_
 from shotenv.decision.problem import Problem
 from shotenv.decision.score import SUMMED, DepthScore, no_depth, score_depth, sum_pixels_
 from shotenv.decision.state import State
@@ -115,9 +115,11 @@ def _measured_by_loop(
         shift2=shift_in_turns(1, problem.description, drive.drift_m, len(step)),
     )
     score, error_of_four, sums = (np.zeros((*size, len(step))) for size in ((5,), (), (8,)))
-    work = taken, chain_of(problem), score, error_of_four, sums
+    chain, (rows_, columns) = chain_of(problem), taken.truth_m.shape[1:]
     finite = in_parts(
-        lambda begin, end: score_frames_(begin, end, *work),
+        lambda begin, end: score_frames_(
+            begin, end, taken, chain, room_for(rows_, columns), score, error_of_four, sums
+        ),
         len(step),
         least=1 + THREAD_PIXELS // (bank.height * bank.width),
     )
