@@ -160,17 +160,17 @@ def paint(measured: dict[str, dict[str, Any]]) -> None:
 
 HEAD = """# What there is to win
 
-Made by `python docs/problem_page.py DIR` from what
-`shotenv problem --env configs/env/PRESET.yaml --json DIR/PRESET.json` measures
-(kept in `docs/problem/`, from which it is made without `DIR`): every action in
-every frame of the test drives of the bank `pocket` (`strong`: `starter`), with the drive's own
-noise, and from these tables what policies that know everything, nothing, or what the sensor tells could reach. Cost is
-the weighted sum of the reward's terms; intervals are 95 % bootstrap intervals over clips. Foresight
-is a small network that foresees each action's error from gray image, unwrapping network and the
-drive's settings, trained on train drives, told what looking showed (how far 2 and 4 of the 8
-samples of the last frame were from all of them) or not. The goals are those of the default problem,
-or for `hot` of one in which heat binds; the other presets are what they are for and need not meet
-them. At the end stands what plain learners make of the default problem.
+Made by `python docs/problem_page.py DIR` from what `shotenv problem --env configs/env/PRESET.yaml
+--json DIR/PRESET.json` measures (kept in `docs/problem/`, from which it is made without `DIR`):
+every action in every frame of the test drives of the bank `pocket` (`strong`: `starter`), with
+the drive's own noise, and from these tables what policies that know everything, nothing, or what
+the sensor tells could reach. Cost is the weighted sum of the reward's terms; intervals are 95 %
+bootstrap intervals over clips. Foresight is a small network that foresees each action's error
+from gray image, unwrapping network and the drive's settings, trained on train drives, told what
+looking showed (how far 2 and 4 of the 8 samples of the last frame were from all of them) or not.
+The goals are those of the default problem, or for `hot` of one in which heat binds; the other
+presets are what they are for and need not meet them. At the end stands what plain learners make
+of the default problem.
 
 ![Error against laser energy by preset; dots are always 2, 4 and 8 DCS](images/problem.png)
 """

@@ -105,6 +105,8 @@ class Room(NamedTuple):
         Eight samples [1, 8, H, W]; the first two, the first four, the last four of them.
     cosine_row, sine_row, cosine2_row : [H W]
         `cosine`, `sine`, `cosine2`.
+    maps, masks : [5, 1, H, W], [3, 1, H, W]
+        Noise, amplitude and residual at f1, the latter at f2; saturated, scored, valid.
     distances : [3, 1, H, W]
         Of the first two, the first four and all samples.
     score, sums : [5, 1], [8, 1]
@@ -118,21 +120,15 @@ class Room(NamedTuple):
     of_four: Array
     at_f2: Array
     no_offset: Array
-    noise: Array
+    maps: Array
     cosine: Array
     sine: Array
     cosine2: Array
     cosine_row: Array
     sine_row: Array
     cosine2_row: Array
-    amplitude: Array
-    residual: Array
-    amplitude2: Array
-    residual2: Array
     distances: Array
-    saturated: Array
-    scored: Array
-    valid: Array
+    masks: Array
     score: Array
     sums: Array
 
@@ -153,21 +149,15 @@ def room_for(rows: int, columns: int) -> Room:
         of_four=samples[0, :4][None],
         at_f2=samples[0, 4:][None],
         no_offset=np.zeros(one, np.float32),
-        noise=np.empty(one, np.float32),
+        maps=np.empty((5, *one), np.float32),
         cosine=cosine,
         sine=sine,
         cosine2=cosine2,
         cosine_row=cosine.reshape(-1),
         sine_row=sine.reshape(-1),
         cosine2_row=cosine2.reshape(-1),
-        amplitude=np.empty(one, np.float32),
-        residual=np.empty(one, np.float32),
-        amplitude2=np.empty(one, np.float32),
-        residual2=np.empty(one, np.float32),
         distances=np.empty((3, 1, rows, columns), np.float32),
-        saturated=np.empty(one, np.bool_),
-        scored=np.empty(one, np.bool_),
-        valid=np.empty(one, np.bool_),
+        masks=np.empty((3, *one), np.bool_),
         score=np.empty((5, 1)),
         sums=np.empty((8, 1)),
     )
@@ -209,10 +199,10 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
         """
         used_for_the_cache_of_numba = stamp  # noqa: F841
         finite = True
-        saturated, scored, valid = room.saturated, room.scored, room.valid
-        noise, distances = room.noise, room.distances
-        cosine, sine, cosine2 = room.cosine, room.sine, room.cosine2
-        amplitude, residual, amplitude2 = room.amplitude, room.residual, room.amplitude2
+        saturated, scored, valid = room.masks[0], room.masks[1], room.masks[2]
+        noise, amplitude, residual = room.maps[0], room.maps[1], room.maps[2]
+        amplitude2, residual2 = room.maps[3], room.maps[4]
+        cosine, sine, cosine2, distances = room.cosine, room.sine, room.cosine2, room.distances
         for b in range(begin, end):
             e = b + 1
             light, truth_m, shots = taken.light, taken.truth_m[b:e], taken.shots[b]
@@ -235,9 +225,8 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
                     own.correlation, own.active, own.ambient, emitted_e, own.ambient_e
                 )
                 counts = derates or not derated
-                last = max(shots, 4) if counts else 4
                 saturated[:] = False
-                for number in range(last):
+                for number in range(max(shots, 4) if counts else 4):
                     if number % 2 == 0:
                         fill_normals_(
                             NOISE,
@@ -270,11 +259,10 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
                         known.most_offset,
                         noise,
                     )
-                    # Two samples hold the offset; see `offset_to_subtract_lsb`.
-                    offset_lsb = taken.calibrated_lsb[b:e] if count == 2 else room.no_offset
                     finite &= decode_pixels(
                         room.of_two if count == 2 else room.of_four,
-                        offset_lsb,
+                        # Two samples hold the offset; see `offset_to_subtract_lsb`.
+                        taken.calibrated_lsb[b:e] if count == 2 else room.no_offset,
                         cosine,
                         sine,
                         amplitude,
@@ -296,7 +284,6 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
                         distance_m,
                         valid,
                     )
-                    told = amplitude if count == 2 else residual
                     if count == 8 and chain.fuses:
                         finite &= decode_pixels(
                             room.at_f2,
@@ -304,7 +291,7 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
                             cosine2,
                             sine,
                             amplitude2,
-                            room.residual2,
+                            residual2,
                         )
                         angle_pixels(room.sine_row, room.cosine2_row, room.cosine2_row)
                         fuse_pixels(
@@ -336,7 +323,7 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
                     if counts and count == shots:
                         sum_pixels_(
                             amplitude,
-                            told,
+                            amplitude if count == 2 else residual,
                             noise,
                             valid,
                             saturated,
