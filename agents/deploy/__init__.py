@@ -1,0 +1,5 @@
+"""Schedulers for a camera: ONNX, C99 without dependencies, and sequences that cameras play."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
