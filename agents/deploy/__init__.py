@@ -1,4 +1,4 @@
-"""Schedulers for a camera: ONNX, C99 without dependencies, and sequences that cameras play."""
+"""Schedulers as files for cameras."""
 
 import lazy_loader
 

@@ -27,7 +27,7 @@ def onnx_policy(policy: NetworkPolicy, metadata: dict[str, str]) -> bytes:
     from onnx import TensorProto, checker, helper, numpy_helper
 
     layers = linear_layers(policy.network)
-    weights, nodes = [numpy_helper.from_array(np.float32(-np.inf), "never")], []
+    weights, nodes = [numpy_helper.from_array(np.array(-np.inf, np.float32), "never")], []
     seen = "observation"
     for number, layer in enumerate(layers):
         for name, value in (("weight", layer.weight), ("bias", layer.bias)):

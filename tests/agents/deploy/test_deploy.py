@@ -22,7 +22,7 @@ from agents.deploy.agreement import (
 from agents.deploy.c_check import run_self_test
 from agents.deploy.c_source import HEADER, SOURCE, VECTORS
 from agents.deploy.camera_files import cost_of_choice, export_policy
-from agents.deploy.mode_switching import mode_switching, modes_of_shots
+from agents.deploy.camera_modes import mode_switching, modes_of_shots
 from agents.deploy.onnx_policy import check_onnx, onnx_policy
 from agents.evaluation.play import make_envs
 from agents.policies.fixed import CyclePolicy, FixedPolicy, RandomPolicy
