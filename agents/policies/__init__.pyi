@@ -4,10 +4,10 @@ from .fixed import (
     RandomPolicy as RandomPolicy,
 )
 from .learned import (
-    PpoPolicy as PpoPolicy,
+    NetworkPolicy as NetworkPolicy,
+    Provenance as Provenance,
     first_line as first_line,
     load_policy as load_policy,
-    network_arguments as network_arguments,
 )
 from .policy import Action as Action, Observation as Observation, Policy as Policy
 from .rules import (
@@ -15,3 +15,4 @@ from .rules import (
     SnrThresholdPolicy as SnrThresholdPolicy,
     rule_in_words as rule_in_words,
 )
+from .score_networks import linear_layers as linear_layers, widths_of as widths_of
