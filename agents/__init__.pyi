@@ -1,8 +1,8 @@
 from .policies import (
     CyclePolicy as CyclePolicy,
     FixedPolicy as FixedPolicy,
+    NetworkPolicy as NetworkPolicy,
     Policy as Policy,
-    PpoPolicy as PpoPolicy,
     RandomPolicy as RandomPolicy,
     SnrThresholdPolicy as SnrThresholdPolicy,
     load_policy as load_policy,

@@ -2,6 +2,9 @@
 
 - `stepping`: a step of the environment, and of a vector of them, over the least it could do:
   drawing its normal numbers, and one atan2 over its pixels;
+- `playing`: frames that a vector of drives plays in a second: of a thinned bank, over every pixel;
+  of many drives, over some; of one process, over one for each core; and of PPO, over its
+  environment;
 - `sensing`: an 8-DCS frame sensed and decoded, over drawing its normal numbers;
 - `unwrapping`: the kernel-density vote of an 8-DCS frame, over its form of array operations;
 - `rendering`: a rendered frame over Mitsuba's own path integrator with as many rays;

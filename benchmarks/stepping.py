@@ -6,7 +6,6 @@ import math
 import os
 import tempfile
 from collections.abc import Sequence
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,6 @@ from shotenv.bank.store import write_clip, write_manifest
 from shotenv.config import env_config
 from shotenv.decision import open_problem, reset, step
 from shotenv.env import ShotScheduleVectorEnv
-from shotenv.sensor import noise_samples
 from unwrap.networks import TofRegNet, save_weights
 from unwrap.signal import Shots
 
@@ -98,12 +96,14 @@ def single(fields: dict[str, object], shots: Shots) -> dict:
 
 
 def least(acquisitions: Sequence[Shots], pixels: torch.Tensor) -> None:
-    """Draw the normals of each acquisition, and take one atan2 over its pixels."""
+    """Draw the normals of each acquisition as torch does, and take one atan2 over its pixels."""
+    # Torch's and not this project's, which may become faster without making a step dearer.
+    normals, generator = torch.empty(2, HEIGHT, WIDTH), torch.Generator().manual_seed(0)
     for shots in acquisitions:
         # Of two samples the reward's reference needs two more.
         drawn = max(shots, Shots.FOUR)
-        for _ in islice(noise_samples([0], [0], HEIGHT, WIDTH), drawn):
-            pass
+        for _ in range(drawn):
+            normals.normal_(generator=generator)
         torch.atan2(pixels[0], pixels[1])
 
 

@@ -1,13 +1,19 @@
-"""`docs/problem.md` and its picture, from what `shotenv problem --json` wrote for each preset.
+"""`docs/problem.md`, its picture and the README's table, from what was measured.
 
-for preset in default hot battery night_shift paper: shotenv problem
---env configs/env/PRESET.yaml --json DIR/PRESET.json (--goals hot for hot); then
-`python docs/problem_page.py DIR`. Needs matplotlib.
+Into one folder DIR, for each of the presets default hot battery night_shift paper strong:
+
+shotenv problem --env configs/env/PRESET.yaml --json DIR/PRESET.json (--goals hot for hot)
+python docs/learnability.py --json DIR/learnability.json
+
+Then `python docs/problem_page.py DIR` keeps what the page needs in `docs/problem/`; without DIR it
+writes the page from there. The picture needs matplotlib.
 """
 
 from __future__ import annotations
 
 import json
+import re
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -15,7 +21,21 @@ from typing import Any
 from shotenv.config import configs_dir
 
 DOCS = Path(__file__).parent
+PAGE = DOCS / "problem.md"
 PICTURE = DOCS / "images" / "problem.png"
+README = DOCS.parent / "README.md"
+NUMBERS = DOCS / "problem"
+PRESETS = ("default", "hot", "battery", "night_shift", "paper", "strong")
+LEARNERS = "learnability"
+UNUSED = ("frame_explains", "sweep")
+"""What `shotenv problem` tells beside what is on the page."""
+ROWS = {
+    "best_blind": "best choice that looks at nothing",
+    "regression_without_looking": "foresight from gray image and network",
+    "regression": ("the same, told what the last frame's shorter acquisitions were found to lose"),
+    "clairvoyant": "clairvoyant",
+}
+"""Of the README's table."""
 FRONTS = {
     "clairvoyant": ("clairvoyant: knows every outcome", "#0b3d91", "-"),
     "regression": ("foresight, told what looking showed", "#c2410c", "-"),
@@ -140,32 +160,115 @@ def paint(measured: dict[str, dict[str, Any]]) -> None:
 
 HEAD = """# What there is to win
 
-Made by `python docs/problem_page.py DIR` from what
-`shotenv problem --env configs/env/PRESET.yaml --json DIR/PRESET.json` measures: every action in
-every frame of the test drives of the bank `pocket`, with the drive's own noise, and from these
-tables what policies that know everything, nothing, or what the sensor tells could reach. Cost is
-the weighted sum of the reward's terms; intervals are 95 % bootstrap intervals over clips. Foresight
-is a small network that foresees each action's error from gray image, unwrapping network and the
-drive's settings, trained on train drives, told what looking showed (how far 2 and 4 of the 8
-samples of the last frame were from all of them) or not. The goals are those of the default problem,
-or for `hot` of one in which heat binds; the other presets are what they are for and need not meet
-them. `configs/env/strong.yaml`, which needs a rendered bank, is not on this page.
+Made by `python docs/problem_page.py DIR` from what `shotenv problem --env configs/env/PRESET.yaml
+--json DIR/PRESET.json` measures (kept in `docs/problem/`, from which it is made without `DIR`):
+every action in every frame of the test drives of the bank `pocket` (`strong`: `starter`), with
+the drive's own noise, and from these tables what policies that know everything, nothing, or what
+the sensor tells could reach. Cost is the weighted sum of the reward's terms; intervals are 95 %
+bootstrap intervals over clips. Foresight is a small network that foresees each action's error
+from gray image, unwrapping network and the drive's settings, trained on train drives, told what
+looking showed (how far 2 and 4 of the 8 samples of the last frame were from all of them) or not.
+The goals are those of the default problem, or for `hot` of one in which heat binds; the other
+presets are what they are for and need not meet them. At the end stands what plain learners make
+of the default problem.
 
 ![Error against laser energy by preset; dots are always 2, 4 and 8 DCS](images/problem.png)
 """
 
 
+def learners(found: dict[str, Any]) -> str:
+    """What agents of stable-baselines3 with library defaults learn."""
+    rows = [
+        "| | over always 2 | over always 4 | over always 8 | over itself without looking | error | "
+        "2 / 4 / 8 DCS |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for run in found["runs"]:
+        pairs = [*run["over"].values(), run["over_itself_without_looking"]]
+        differences = " | ".join(difference(one) for one in pairs)
+        shares = " / ".join(percent(one) for one in run["shots_share"])
+        rows.append(
+            f"| {run['algorithm']}, seed {run['seed']} | {differences} | "
+            f"{run['depth_mae_m']:.2f} m | {shares} |"
+        )
+    return "\n\n".join(
+        [
+            "## Plain learners",
+            "PPO and DQN of stable-baselines3 with the library's defaults but for the discount, "
+            f"trained for {found['steps']:,} frames of one environment (`python "
+            f"docs/learnability.py`), on {found['drives']} test drives: difference of the return "
+            "of a drive, with its 95 % interval over clips. Without looking, the features that "
+            "tell what a longer acquisition showed are 0.",
+            "\n".join(rows),
+        ]
+    )
+
+
+def difference(one: dict[str, float]) -> str:
+    """A difference of returns and its interval."""
+    return f"{one['difference']:+.0f} ({one['low']:+.0f} to {one['high']:+.0f})"
+
+
+def keep_numbers(folder: Path) -> None:
+    """Keep what the page needs of the files in `folder`."""
+    NUMBERS.mkdir(exist_ok=True)
+    for preset in PRESETS:
+        found = json.loads((folder / f"{preset}.json").read_text(encoding="utf-8"))
+        used = {name: value for name, value in found.items() if name not in UNUSED}
+        text = json.dumps(used, indent=1) + "\n"
+        (NUMBERS / f"{preset}.json").write_text(text, encoding="utf-8")
+    shutil.copyfile(folder / f"{LEARNERS}.json", NUMBERS / f"{LEARNERS}.json")
+
+
+def kept(name: str) -> dict[str, Any]:
+    """The numbers kept under a name."""
+    return json.loads((NUMBERS / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def measured() -> dict[str, dict[str, Any]]:
+    """The numbers kept of each preset."""
+    return {preset: kept(preset) for preset in PRESETS}
+
+
+def page(found: dict[str, dict[str, Any]], learned: dict[str, Any]) -> str:
+    """The page of these numbers."""
+    sections = [section(*item) for item in found.items()]
+    return "\n\n".join([HEAD.rstrip(), *sections, learners(learned)]) + "\n"
+
+
+def filled_readme(text: str, found: dict[str, Any]) -> str:
+    """The README with its table, between `<!-- problem -->` and `<!-- end -->`, of these numbers.
+
+    Raises
+    ------
+    ValueError
+        It has no place for the table, or several.
+    """
+    rows = [
+        "| mean depth error at half of always-8's laser energy | | 95 % interval |",
+        "|---|---|---|",
+    ]
+    for name, words in ROWS.items():
+        one = found["error_at_half_energy"][name]
+        rows.append(f"| {words} | {one['mean']:.2f} m | {one['low']:.2f} to {one['high']:.2f} m |")
+    table = "<!-- problem -->\n\n" + "\n".join(rows) + "\n\n<!-- end -->"
+    filled, count = re.subn(
+        r"<!-- problem -->\n.*?<!-- end -->", lambda _: table, text, flags=re.DOTALL
+    )
+    if count != 1:
+        raise ValueError(f"{README} has {count} places for the table; expected one")
+    return filled
+
+
 def main() -> None:
-    """Write page and picture."""
-    folder = Path(sys.argv[1])
-    presets = ("default", "hot", "battery", "night_shift", "paper")
-    measured = {
-        preset: json.loads((folder / f"{preset}.json").read_text(encoding="utf-8"))
-        for preset in presets
-    }
-    paint(measured)
-    text = "\n\n".join([HEAD.rstrip(), *(section(*item) for item in measured.items())])
-    (DOCS / "problem.md").write_text(text + "\n", encoding="utf-8")
+    """Write page, picture and the README's table."""
+    if len(sys.argv) > 1:
+        keep_numbers(Path(sys.argv[1]))
+    found = measured()
+    PAGE.write_text(page(found, kept(LEARNERS)), encoding="utf-8")
+    readme = filled_readme(README.read_text(encoding="utf-8"), found["default"])
+    README.write_text(readme, encoding="utf-8")
+    paint(found)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from agents.cli import (
     bank_commands,
     collect_command,
     doctor_command,
+    export_command,
     play_command,
     problem_command,
     schedule_commands,
@@ -32,6 +33,7 @@ COMMANDS: tuple[Command, ...] = (
     *problem_command.COMMANDS,
     *play_command.COMMANDS,
     *collect_command.COMMANDS,
+    *export_command.COMMANDS,
     *bank_commands.COMMANDS,
     *unwrap_commands.COMMANDS,
 )

@@ -72,10 +72,10 @@ def evaluate_arguments(parser: ArgumentParser) -> None:
 def evaluate(arguments: Namespace) -> int:
     """Judge a trained scheduler."""
     from agents.evaluation import evaluate_scheduler
-    from agents.policies import PpoPolicy
+    from agents.policies import NetworkPolicy
 
     # Loaded first: a folder without a scheduler is refused before a bank is rendered.
-    scheduler, config = PpoPolicy.load(arguments.scheduler), experiment_of(arguments)
+    scheduler, config = NetworkPolicy.load(arguments.scheduler), experiment_of(arguments)
     prepare_bank(config.env)
     play_on_one_thread()
     return publish(arguments, config, evaluate_scheduler(config, scheduler))

@@ -14,5 +14,5 @@ from .play import (
     play_drives as play_drives,
 )
 from .study import Evaluation as Evaluation, evaluate_scheduler as evaluate_scheduler
-from .summary import drive_rows as drive_rows, timeline as timeline
+from .summary import difference as difference, drive_rows as drive_rows, timeline as timeline
 from .tuning import Tuned as Tuned, best_at_prices as best_at_prices, tune as tune

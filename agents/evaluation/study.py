@@ -18,8 +18,8 @@ from agents.evaluation.summary import summary
 from agents.optimum import best_rule, tabulate
 from agents.policies import (
     CyclePolicy,
+    NetworkPolicy,
     Policy,
-    PpoPolicy,
     RandomPolicy,
     SnrThresholdPolicy,
 )
@@ -84,7 +84,7 @@ def play_all(config: DemoConfig, policies: Mapping[str, Policy]) -> dict[str, Pl
         }
 
 
-def evaluate_scheduler(config: DemoConfig, scheduler: PpoPolicy) -> Evaluation:
+def evaluate_scheduler(config: DemoConfig, scheduler: NetworkPolicy) -> Evaluation:
     """Judge `scheduler` beside the baselines; nothing is written.
 
     Raises

@@ -6,10 +6,10 @@ from .fixed import (
     RandomPolicy as RandomPolicy,
 )
 from .learned import (
-    PpoPolicy as PpoPolicy,
+    NetworkPolicy as NetworkPolicy,
+    Provenance as Provenance,
     first_line as first_line,
     load_policy as load_policy,
-    network_arguments as network_arguments,
 )
 from .looking import (
     LookAndHoldPolicy as LookAndHoldPolicy,
@@ -27,6 +27,7 @@ from .rules import (
     SnrTwoThresholdPolicy as SnrTwoThresholdPolicy,
     rule_in_words as rule_in_words,
 )
+from .score_networks import linear_layers as linear_layers, widths_of as widths_of
 from .watching import (
     DistanceHysteresisPolicy as DistanceHysteresisPolicy,
     MotionPolicy as MotionPolicy,

@@ -26,14 +26,14 @@ from stable_baselines3.common.utils import set_random_seed
 from tqdm import tqdm
 
 from agents.config import AgentConfig
-from agents.policies import PpoPolicy, first_line, network_arguments
+from agents.policies import NetworkPolicy, Provenance, first_line
 from agents.training.sb3_vector import Sb3VecEnv
-from unwrap.support import progress, write_bytes
+from unwrap.support import Range, progress, write_bytes
 
 # One file, replaced whole: network, optimiser and progress of the same round, or none of them.
 CHECKPOINT: Final = "checkpoint.safetensors"
 SCHEMA: Final = "1"
-Validate = Callable[[PpoPolicy], float]
+Validate = Callable[[NetworkPolicy], float]
 
 
 @dataclass(frozen=True)
@@ -74,6 +74,8 @@ class Trainer:
         Gets the checkpoint, and the best policy as `policy.safetensors` and `agent.json`.
     warm : callable, optional
         Trains the actor before the first round, see `agents.training.warmup`.
+    power_price : (float, float), optional
+        Range of the weight of power in the drives, which the saved policy tells.
 
     Raises
     ------
@@ -90,6 +92,7 @@ class Trainer:
         validate: Validate,
         out: Path,
         warm: Callable[[ActorCriticPolicy], None] | None = None,
+        power_price: Range | None = None,
     ) -> None:
         self._envs, self._config, self._validate, self._out = envs, config, validate, out
         self._warm = warm
@@ -109,11 +112,17 @@ class Trainer:
             gamma=config.gamma,
             gae_lambda=config.gae_lambda,
             ent_coef=config.entropy_coefficient,
-            policy_kwargs=network_arguments(config),
+            policy_kwargs={"net_arch": list(config.hidden)},
             seed=config.seed,
             device="cpu",  # two small layers: copying to a GPU would take longer
         )
-        self.policy = PpoPolicy(self._ppo.policy, config, feature_names)
+        self._provenance = Provenance(
+            algorithm="ppo",
+            feature_names=tuple(feature_names),
+            power_price=power_price,
+            training=config.model_dump(mode="json"),
+            seed=config.seed,
+        )
         # What a checkpoint must have been made with to be continued here.
         self._identity = json.dumps(
             {
@@ -122,7 +131,12 @@ class Trainer:
             }
         )
 
-    def run(self) -> PpoPolicy:
+    @property
+    def policy(self) -> NetworkPolicy:
+        """The actor as it is now."""
+        return NetworkPolicy.from_ppo(self._ppo.policy, self._provenance)
+
+    def run(self) -> NetworkPolicy:
         """Train to the end, from the checkpoint where there is one; returns the best policy.
 
         Raises
@@ -159,14 +173,15 @@ class Trainer:
                 bar.set_postfix_str(f"validation return {state.best_return:.1f}", refresh=False)
                 self._save(state)
         # From disk: the best round's policy, which need not be the last one's.
-        return PpoPolicy.load(self._out)
+        return NetworkPolicy.load(self._out)
 
     def _judged(self, state: TrainingState) -> TrainingState:
         """`state` with the return of the policy as it is, which is kept where it is the best."""
-        found = self._validate(self.policy)
+        policy = self.policy
+        found = self._validate(policy)
         if found <= state.best_return:
             return state
-        self.policy.save(self._out)
+        policy.save(self._out)
         return replace(state, best_return=found, best_round=state.rounds)
 
     def _save(self, state: TrainingState) -> None:

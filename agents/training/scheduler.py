@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from agents.config import DemoConfig
 from agents.evaluation import drive_seeds, make_envs, play_drives
-from agents.policies import PpoPolicy
+from agents.policies import NetworkPolicy
 from agents.training.ppo import Trainer, training_drives
 from agents.training.sb3_vector import Sb3VecEnv
 from agents.training.warmup import ROLLOUTS, known_frames, warm_start
@@ -21,7 +21,7 @@ VALIDATION_DRIVES: Final = 6
 """Most drives that choose the best round (assumed): they are played again after each."""
 
 
-def train_scheduler(config: DemoConfig, out: Path) -> PpoPolicy:
+def train_scheduler(config: DemoConfig, out: Path) -> NetworkPolicy:
     """Train PPO on training drives, from its checkpoint in `out` where there is one.
 
     The policy with the best return on validation drives is kept.
@@ -31,7 +31,7 @@ def train_scheduler(config: DemoConfig, out: Path) -> PpoPolicy:
     # Other clips than those of training, and than those of the test that the report tells of.
     judges = make_envs(config.env, "validation", len(seeds), "Disabled")
 
-    def validate(policy: PpoPolicy) -> float:
+    def validate(policy: NetworkPolicy) -> float:
         return float(play_drives(policy, judges, seeds).reward.sum(axis=1).mean())
 
     def warm(network: ActorCriticPolicy) -> None:
@@ -51,4 +51,5 @@ def train_scheduler(config: DemoConfig, out: Path) -> PpoPolicy:
         validate,
         out,
         warm if config.agent.warm_start else None,
+        config.env.reward.power,
     ).run()

@@ -82,15 +82,15 @@ class ThinnedBank(Bank):
         """See `Bank.exposure`."""
         light = self._light
         maps = (light.correlation, light.active, light.ambient, light.distance_m)
-        return Exposure(*(each.index_select(0, indices) for each in maps))
+        return Exposure(*(_picked(each, indices) for each in maps))
 
     def distance_m(self, indices: Tensor) -> Tensor:
         """See `Bank.distance_m`."""
-        return self._light.distance_m.index_select(0, indices)
+        return _picked(self._light.distance_m, indices)
 
     def gray(self, indices: Tensor) -> Tensor:
         """See `Bank.gray`."""
-        return self._arrays["gray"].index_select(0, indices)
+        return _picked(self._arrays["gray"], indices)
 
     def network(self, label: WeightsLabel) -> StoredNetwork:
         """The stored network that has these weights.
@@ -128,6 +128,15 @@ class ThinnedBank(Bank):
     def log_ambient(self) -> Tensor:
         """Log10 of the ambient radiance of the full frames on a coarse grid, float32 [N, K]."""
         return self._arrays[LOG_AMBIENT]
+
+
+def _picked(maps: Tensor, indices: Tensor) -> Tensor:
+    """The maps `indices` [B] of a bank's, copied by NumPy.
+
+    By torch, threads would share the copying, and wait for each other longer than it takes wherever
+    another process has a part of the cores.
+    """
+    return torch.from_numpy(maps.numpy().take(indices.numpy(), axis=0))
 
 
 @lru_cache(maxsize=2)

@@ -16,7 +16,6 @@ from .features import (
 )
 from .measurement import Measure as Measure, measure_frames as measure_frames
 from .measurement_cache import MeasurementCache as MeasurementCache
-from .observation import observe as observe
 from .outcomes import Outcomes as Outcomes, outcomes_of_all_actions as outcomes_of_all_actions
 from .problem import Problem as Problem, open_problem as open_problem
 from .rewards import TERMS as TERMS, weighted as weighted
@@ -25,7 +24,7 @@ from .scenes import (
     look_at_scenes as look_at_scenes,
     probe_features as probe_features,
 )
-from .state import State as State
+from .state import State as State, observe as observe
 from .transition import (
     Outcome as Outcome,
     allowed_actions as allowed_actions,

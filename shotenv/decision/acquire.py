@@ -47,10 +47,10 @@ class Acquisition:
 def noise_of(drive: Drive, step: Tensor, height: int, width: int) -> Iterator[Tensor]:
     """Normals [B, 2, H, W], sample after sample, of the frames at `step` [B].
 
-    Each drive has its own stream.
+    Each drive has its own.
     """
     # By the step and not the bank frame: a clip that comes twice in a drive is noisy anew.
-    return noise_samples(drive.seed.tolist(), step.tolist(), height, width)
+    return noise_samples(drive.seed, step, height, width)
 
 
 def acquire_depth(

@@ -180,7 +180,13 @@ def heat_margin_k(feature: np.ndarray) -> np.ndarray:
 
 def recently(since: Tensor) -> Tensor:
     """0 right after something was seen, towards 1 as it grows old: 1 - exp(-n / 16), n frames."""
-    return 1.0 - torch.exp(since / -16.0)
+    # By NumPy, as below: torch's own shares a few hundred numbers among threads, and waits for them.
+    return torch.from_numpy(1.0 - np.exp(since.numpy() / -16.0))
+
+
+def log10(values: Tensor) -> Tensor:
+    """Base-10 logarithm."""
+    return torch.from_numpy(np.log10(values.numpy()))
 
 
 # One line for each, however long: name and formula are read together. The numbers in the formulas
@@ -229,8 +235,8 @@ STATE_FEATURES = (
     Feature("duty", "always 8", "laser duty over the last second", lambda n: n.duty),
     Feature("power", "always 8", "power over the last second", lambda n: n.power),
     Feature("power_price", "1", "weight p of power in the reward: p / (p + 0.05)", lambda n: n.power_price / (n.power_price + 0.05)),
-    Feature("laser_power", "log10 of 5 W", "optical power while on", lambda n: (n.laser_power_w / 5.0).log10()),
-    Feature("integration", "log10 of 0.5 ms", "integration time of a sample", lambda n: (n.integration_s / 0.5e-3).log10()),
+    Feature("laser_power", "log10 of 5 W", "optical power while on", lambda n: log10(n.laser_power_w / 5.0)),
+    Feature("integration", "log10 of 0.5 ms", "integration time of a sample", lambda n: log10(n.integration_s / 0.5e-3)),
     Feature("time_left", "1", "1 at the start of the drive, -1 at its end", lambda n: 1.0 - n.step * (2.0 / n.frames)),
 )
 """Functions of `Now`."""
@@ -251,7 +257,9 @@ samples, which leave out what takes more, and row 0, of none, is all false."""
 
 def evaluated(features: Sequence[Feature], seen: Scene | Sums | Now) -> Tensor:
     """Values of `features`, float32 [B, len(features)]."""
-    return torch.stack([feature.value(seen).to(torch.float32) for feature in features], dim=1)
+    # Converted together: torch finds the type that holds all of them, and each number is rounded
+    # once.
+    return torch.stack([feature.value(seen) for feature in features], dim=1).to(torch.float32)
 
 
 def feature_index(feature_names: Sequence[str], name: str) -> int:

@@ -4,23 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from shotenv.config import EnvConfig
 from shotenv.decision.acquire import Acquisition, acquire_depths
 from shotenv.decision.drive import Drive
 from shotenv.decision.features import SEEN_FEATURES, TOLD, Sums, evaluated
+from shotenv.decision.frame_loop import Chain, FramesTaken, room_for, score_frames_
 from shotenv.decision.problem import Problem
-from shotenv.decision.score import DepthScore, no_depth, score_depth
+from shotenv.decision.score import SUMMED, DepthScore, no_depth, score_depth, sum_pixels_
 from shotenv.decision.state import State
-from unwrap.signal import Shots
-from unwrap.support import array, loop, put, take
+from shotenv.sensor import gray_noise, incident_light, pixel_of, row_parity, sensitivity
+from unwrap.depth import RULES, dual_limits, merge_limits, shift_in_turns, turns_table
+from unwrap.signal import SensorDescription, Shots, unambiguous_range_m
+from unwrap.support import array, in_parts, long_rows, mapped, put, take
 
 Array = np.ndarray
-# One Python float among them would make the arithmetic of the loops float64.
-ZERO, FOUR_SIGMA = np.float32(0.0), np.float32(4.0)
+THREAD_PIXELS = 4096
+"""Fewest pixels that are worth a thread of their own: some 0.2 ms of work."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +48,7 @@ class Measurement:
     features: Tensor
 
 
-Measure = Callable[[Problem, Drive, Tensor, Shots, Tensor | None], Measurement]
+Measure = Callable[[Problem, Drive, Tensor, Tensor, Tensor | None], Measurement]
 """`measure_frames`, or what gives the same numbers faster (`MeasurementCache`)."""
 
 
@@ -51,19 +56,143 @@ def measure_frames(
     problem: Problem,
     drive: Drive,
     step: Tensor,
-    shots: Shots,
+    shots: Shots | Tensor,
     power_w: Tensor | None = None,
-    *,
-    noise: Sequence[Tensor] | None = None,
 ) -> Measurement:
-    """Acquire, correct and score the frames at `step` [B] of `drive`; see `acquire_depths`."""
+    """Acquire, correct and score the frames at `step` [B] of `drive`; see `acquire_depths`.
+
+    Parameters
+    ----------
+    shots : Shots or int64 [B]
+        Of all frames, or of each: 0, 2, 4 or 8; with 0 there is no depth.
+    power_w : float64 [B], optional
+        What each laser emits while on, W; None is the drive's own power, not derated.
+    """
+    each = torch.full_like(step, int(shots)) if isinstance(shots, Shots) else shots
+    power_w = drive.laser_power_w if power_w is None else power_w
+    # Networks that look at samples, and votes of neighbours, need whole maps of the batch.
+    if problem.fusion is None and problem.config.eight != "kernel_density":
+        return _measured_by_loop(problem, drive, step, each, power_w)
+    return _measured_by_maps(problem, drive, step, each, power_w)
+
+
+def _measured_by_loop(
+    problem: Problem, drive: Drive, step: Tensor, shots: Tensor, power_w: Tensor
+) -> Measurement:
+    """By one compiled loop, frame by frame."""
+    config, bank, frames = problem.config, problem.bank, drive.frame(step)
+    sensor, exposure = config.sensor, bank.exposure(frames)
+    light = incident_light(exposure, drive.sensitivity)
+    gray_s = problem.gray_exposure_s.take(frames)
+    known = gray_noise(gray_s, drive.integration_s, sensor, offset_left_lsb=drive.offset_left_lsb)
+    # Of more than two samples the offsets cancel.
+    none = np.zeros(len(step), np.float32)
+    emitted_e = light.active_e
+    if drive.is_derated(power_w):
+        emitted_e = array(sensitivity(sensor, power_w, drive.integration_s).active_e)
+
+    def rows(maps: Tensor, dtype: type | None = np.float32) -> Array:
+        return long_rows(array(maps, dtype), SUMMED)
+
+    taken = FramesTaken(
+        shots=shots.numpy(),
+        seeds=drive.seed.numpy(),
+        steps=step.numpy(),
+        light=light._replace(
+            correlation=rows(exposure.correlation),
+            active=rows(exposure.active),
+            ambient=rows(exposure.ambient),
+        ),
+        emitted_e=emitted_e,
+        truth_m=rows(exposure.distance_m),
+        gray=rows(bank.gray(frames), None),
+        predicted_m=rows(problem.kept.distance_of(frames)),
+        pattern_lsb=rows(drive.offsets.pattern_lsb),
+        calibrated_lsb=rows(drive.offsets.calibrated_lsb),
+        noise_of_two=known,
+        noise_of_more=known._replace(offset_variance=none, offset_per_word=none),
+        shift1=shift_in_turns(0, problem.description, drive.drift_m, len(step)),
+        shift2=shift_in_turns(1, problem.description, drive.drift_m, len(step)),
+    )
+    score, error_of_four, sums = (np.zeros((*size, len(step))) for size in ((5,), (), (8,)))
+    chain, (rows_, columns) = chain_of(problem), taken.truth_m.shape[1:]
+    finite = in_parts(
+        lambda begin, end: score_frames_(
+            begin, end, taken, chain, room_for(rows_, columns), score, error_of_four, sums
+        ),
+        len(step),
+        least=1 + THREAD_PIXELS // (bank.height * bank.width),
+    )
+    if not all(finite):
+        raise ValueError(f"bank {bank.name} holds light that is NaN or infinite; render it again")
+    counted = torch.from_numpy(sums)
+    pixels = torch.full_like(counted[0], bank.height * bank.width)
+    found = DepthScore(*torch.from_numpy(score).unbind())
+    if not shots.all():
+        lost = no_depth(len(step), sensor.max_range_m)
+        found = mapped(lambda one, other: torch.where(shots > 0, one, other), found, lost)
+    return Measurement(
+        found,
+        torch.from_numpy(error_of_four),
+        evaluated(SEEN_FEATURES, Sums(pixels, *counted.unbind())),
+    )
+
+
+@lru_cache(maxsize=4)
+def _chain(config: EnvConfig, description: SensorDescription, height: int, width: int) -> Chain:
+    sensor = config.sensor
+    unambiguous_m = unambiguous_range_m(description.f1_hz)
+    return Chain(
+        parity=long_rows(row_parity(height, width), SUMMED),
+        pixel=pixel_of(sensor),
+        range_m=np.float32(sensor.max_range_m),
+        min_snr=np.float32(sensor.min_snr),
+        table1=turns_table(0, description),
+        table2=turns_table(1, description),
+        limits=merge_limits(description),
+        branch=RULES[config.merge].branch,
+        dual=dual_limits(description),
+        fuses=config.eight == "two_frequency",
+        scale_m=np.float32(config.reward.error_scale_m),
+        near_m=np.float32(0.5 * unambiguous_m),
+        worst_m=float(sensor.max_range_m),
+    )
+
+
+def chain_of(problem: Problem) -> Chain:
+    """Constants of a problem's loop; kept, for every step asks."""
+    return _chain(problem.config, problem.description, problem.bank.height, problem.bank.width)
+
+
+def _measured_by_maps(
+    problem: Problem, drive: Drive, step: Tensor, shots: Tensor, power_w: Tensor
+) -> Measurement:
+    """Map by map; drives that take the same number of samples are one batch."""
+    lost = no_depth(len(shots), problem.config.sensor.max_range_m)
+    unseen = torch.zeros(len(shots), len(SEEN_FEATURES))
+    found = Measurement(lost, torch.zeros_like(lost.error), unseen)
+    for count in sorted(set(shots.tolist())):
+        rows = (shots == count).nonzero().squeeze(1)
+        part_drive, part_step = take(drive, rows), step[rows]
+        # Nothing is measured without laser; the reference is that of one that works.
+        own_w = power_w[rows] if count else part_drive.laser_power_w
+        part = _measured_alike(problem, part_drive, part_step, Shots(count or 4), own_w)
+        if not count:
+            part = Measurement(take(lost, rows), part.error_of_four, take(unseen, rows))
+        found = put(found, rows, part)
+    return found
+
+
+def _measured_alike(
+    problem: Problem, drive: Drive, step: Tensor, shots: Shots, power_w: Tensor
+) -> Measurement:
     # Of two samples the reference needs two more, which are taken for it alone.
     counts = [n for n in Shots if n <= max(shots, Shots.FOUR)]
-    acquired = acquire_depths(problem, drive, step, counts, power_w, noise=noise)
+    acquired = acquire_depths(problem, drive, step, counts, power_w)
     taken = acquired[: counts.index(shots) + 1]
     reference = acquired[counts.index(Shots.FOUR)]
-    if power_w is not None and drive.is_derated(power_w):
-        (reference,) = acquire_depths(problem, drive, step, (Shots.FOUR,), noise=noise)
+    if drive.is_derated(power_w):
+        (reference,) = acquire_depths(problem, drive, step, (Shots.FOUR,))
     return Measurement(
         score_of(problem, taken[-1]),
         score_of(problem, reference).error,
@@ -107,7 +236,7 @@ def measure_by_shots(
 ) -> Measurement:
     """Measure the frame of every drive with its own number of samples.
 
-    Drives that take the same number are one batch. A feature that these samples cannot tell stays
+    A feature that these samples cannot tell stays
     as an earlier frame told it: after 8, then 2 DCS, `regret_of_two` is that of the 8.
 
     Parameters
@@ -117,26 +246,8 @@ def measure_by_shots(
     power_w : float64 [B]
         What each laser emits while on, W.
     """
-    drive, step, before = state.drive, state.step, state.seen.features
-    counts = set(shots.tolist())
-    if len(counts) == 1 and 0 not in counts:
-        # The whole batch as it is: picking rows would copy the offsets of every pixel.
-        found = measure(problem, drive, step, Shots(counts.pop()), power_w)
-    else:
-        lost = no_depth(len(shots), problem.config.sensor.max_range_m)
-        found = Measurement(lost, torch.zeros_like(lost.error), before)
-        for count in sorted(counts):
-            rows = (shots == count).nonzero().squeeze(1)
-            part_drive, part_step = take(drive, rows), step[rows]
-            if count:
-                part = measure(problem, part_drive, part_step, Shots(count), power_w[rows])
-            else:
-                # Nothing is measured; the reference is that of a laser which works.
-                four = measure(problem, part_drive, part_step, Shots.FOUR, None)
-                part = Measurement(
-                    take(lost, rows), four.error_of_four, before.index_select(0, rows)
-                )
-            found = put(found, rows, part)
+    before = state.seen.features
+    found = measure(problem, state.drive, state.step, shots, power_w)
     features = torch.where(TOLD.index_select(0, shots), found.features, before)
     return Measurement(found.score, found.error_of_four, features)
 
@@ -156,59 +267,18 @@ def sums_of(taken: Sequence[Acquisition], error_scale_m: float) -> Sums:
     # Where there are no fewer samples, an acquisition stands for itself, and regrets nothing.
     two, four = (taken[min(place, len(taken) - 1)].depth.distance_m for place in (0, 1))
     sum_pixels_(
-        array(depth.amplitude),
+        long_rows(array(depth.amplitude), SUMMED),
         # With two samples there is none; what is made of it is then not told.
-        array(depth.amplitude if depth.residual is None else depth.residual),
-        array(whole.noise_lsb),
-        array(depth.valid, np.bool_),
-        array(whole.raw.saturated, np.bool_),
-        array(depth.distance_m),
-        array(two),
-        array(four),
+        long_rows(array(depth.amplitude if depth.residual is None else depth.residual), SUMMED),
+        long_rows(array(whole.noise_lsb), SUMMED),
+        long_rows(array(depth.valid, np.bool_), SUMMED),
+        long_rows(array(whole.raw.saturated, np.bool_), SUMMED),
+        long_rows(array(depth.distance_m), SUMMED),
+        long_rows(array(two), SUMMED),
+        long_rows(array(four), SUMMED),
         np.float32(error_scale_m),
         sums,
     )
     pixels = depth.valid.shape[1] * depth.valid.shape[2]
     counted = torch.from_numpy(sums)
     return Sums(torch.full_like(counted[0], pixels), *counted.unbind())
-
-
-@loop
-def sum_pixels_(
-    amplitude_lsb: Array,
-    residual_lsb: Array,
-    noise_lsb: Array,
-    valid: Array,
-    saturated: Array,
-    distance_m: Array,
-    by_two_m: Array,
-    by_four_m: Array,
-    scale_m: np.float32,
-    found: Array,
-) -> None:
-    """Write the fields of `Sums` but the pixels into `found`, float64 [8, B], of maps [B, H, W].
-
-    Sums go column by column first, as those of scores do.
-    """
-    frames, rows, columns = valid.shape
-    for b in range(frames):
-        sums, counts = np.zeros((6, columns)), np.zeros((2, columns), np.int32)
-        for i in range(rows):
-            for j in range(columns):
-                four_sigma_lsb = FOUR_SIGMA * noise_lsb[b, i, j]
-                amplitude, residual = amplitude_lsb[b, i, j], residual_lsb[b, i, j]
-                strong = valid[b, i, j]
-                two_m = abs(by_two_m[b, i, j] - distance_m[b, i, j])
-                four_m = abs(by_four_m[b, i, j] - distance_m[b, i, j])
-                apart_m = abs(by_two_m[b, i, j] - by_four_m[b, i, j])
-                counts[0, j] += strong
-                counts[1, j] += saturated[b, i, j]
-                sums[0, j] += amplitude
-                sums[1, j] += amplitude / (amplitude + four_sigma_lsb)
-                sums[2, j] += residual / (residual + four_sigma_lsb)
-                sums[3, j] += two_m / (two_m + scale_m) if strong else ZERO
-                sums[4, j] += four_m / (four_m + scale_m) if strong else ZERO
-                sums[5, j] += apart_m / (apart_m + scale_m) if strong else ZERO
-        found[0, b], found[1, b] = counts[0].sum(), counts[1].sum()
-        for k in range(6):
-            found[2 + k, b] = sums[k].sum()

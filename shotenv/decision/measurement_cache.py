@@ -11,7 +11,6 @@ from shotenv.decision.drive import Drive
 from shotenv.decision.measurement import Measurement, measure_frames
 from shotenv.decision.problem import Problem
 from shotenv.decision.score import DepthScore
-from unwrap.signal import Shots
 from unwrap.support import take
 
 SCORES = tuple(field.name for field in dataclasses.fields(DepthScore))
@@ -48,22 +47,22 @@ class MeasurementCache:
         problem: Problem,
         drive: Drive,
         step: Tensor,
-        shots: Shots,
+        shots: Tensor,
         power_w: Tensor | None = None,
     ) -> Measurement:
-        """As `measure_frames`, for the frames at `step` [B] of `drive`."""
+        """As `measure_frames`, for the frames at `step` [B] of `drive` with `shots` [B] samples."""
         # A derated laser has a power of its own every time, which hardly ever comes again.
         if power_w is not None and drive.is_derated(power_w):
             return measure_frames(problem, drive, step, shots, power_w)
         # A seed names a drive but for what options of `reset` set of it.
         body = drive.laser_power_w, drive.integration_s, drive.ambient_k
-        parts = [part.tolist() for part in (drive.seed, step, drive.frame(step), *body)]
-        keys = [(*key, int(shots)) for key in zip(*parts, strict=True)]
+        parts = [part.tolist() for part in (drive.seed, step, drive.frame(step), *body, shots)]
+        keys = list(zip(*parts, strict=True))
         missing = [i for i, key in enumerate(keys) if key not in self._rows]
         new = {}
         if missing:
             rows = torch.tensor(missing)
-            measured = measure_frames(problem, take(drive, rows), step[rows], shots)
+            measured = measure_frames(problem, take(drive, rows), step[rows], shots[rows])
             new = {keys[i]: row for i, row in zip(missing, _to_rows(measured), strict=True)}
         found = _from_rows([new.get(key) or self._rows[key] for key in keys])
         # All of a batch or none of it: which drives are kept does not depend on their order in it.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isclose
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -13,6 +14,7 @@ from shotenv.config import SensorConfig
 from shotenv.decision.features import SCENE_FEATURES, Scene, evaluated
 from shotenv.sensor import electrons_per_radiance_second, full_scale_lsb, gray_gain_lsb_per_e
 from unwrap.signal import unambiguous_range_m
+from unwrap.support import array, loop
 
 GRID = 8
 """Cells down and across an image in which ambient light is compared from frame to frame."""
@@ -36,7 +38,22 @@ class Scenes:
 
     def change(self, before: Tensor, now: Tensor) -> Tensor:
         """Mean absolute change of log10 ambient between bank frames [B], float32 [B]."""
-        return (self.log_ambient[now] - self.log_ambient[before]).abs_().mean(dim=1)
+        change = np.empty(len(now), np.float32)
+        mean_changes_(array(self.log_ambient), before.numpy(), now.numpy(), change)
+        return torch.from_numpy(change)
+
+
+@loop
+def mean_changes_(values: np.ndarray, before: np.ndarray, now: np.ndarray, change: np.ndarray):
+    """Mean absolute difference of the rows `now` [B] from `before` [B] of values float32 [N, K].
+
+    `change`, float32 [B], is written.
+    """
+    for b in range(len(change)):
+        total = np.float32(0.0)
+        for k in range(values.shape[1]):
+            total += abs(values[now[b], k] - values[before[b], k])
+        change[b] = total / np.float32(values.shape[1])
 
 
 def look_at_scenes(

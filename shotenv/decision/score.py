@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from unwrap.support import array, loop
+from unwrap.support import array, long_rows, loop
 
 Array = np.ndarray
 
@@ -41,7 +41,9 @@ class DepthScore:
     valid_share: Tensor
 
 
-ZERO = np.float32(0.0)
+ZERO, FOUR_SIGMA = np.float32(0.0), np.float32(4.0)
+SUMMED = 64
+"""Pixels of a small map that are summed side by side: rows of this length at most."""
 FARTHEST_ERROR_M = np.float32(1e9)
 """Stands for the error where there is no distance: its term is 1 within the rounding of a float."""
 
@@ -69,10 +71,10 @@ def score_depth(
         raise ValueError(f"distance_m, valid, truth_m and scored are {shapes}; expected one shape")
     score = np.empty((5, len(distance_m)))
     score_pixels_(
-        array(distance_m),
-        array(valid, np.bool_),
-        array(truth_m),
-        array(scored, np.bool_),
+        long_rows(array(distance_m), SUMMED),
+        long_rows(array(valid, np.bool_), SUMMED),
+        long_rows(array(truth_m), SUMMED),
+        long_rows(array(scored, np.bool_), SUMMED),
         np.float32(error_scale_m),
         np.float32(0.5 * unambiguous_m),  # Less far off, the wrap count is right.
         range_m,
@@ -127,3 +129,44 @@ def no_depth(batch: int, range_m: float) -> DepthScore:
     """Score of frames without laser: full error, nothing valid."""
     one, zero = torch.ones(batch, dtype=torch.float64), torch.zeros(batch, dtype=torch.float64)
     return DepthScore(one, one * range_m, one * range_m, zero, zero)
+
+
+@loop
+def sum_pixels_(
+    amplitude_lsb: Array,
+    residual_lsb: Array,
+    noise_lsb: Array,
+    valid: Array,
+    saturated: Array,
+    distance_m: Array,
+    by_two_m: Array,
+    by_four_m: Array,
+    scale_m: np.float32,
+    found: Array,
+) -> None:
+    """Write the fields of `features.Sums`, all but the pixels, of maps [B, H, W].
+
+    Into `found`, float64 [8, B]. Sums go column by column first, as those of scores do.
+    """
+    frames, rows, columns = valid.shape
+    for b in range(frames):
+        sums, counts = np.zeros((6, columns)), np.zeros((2, columns), np.int32)
+        for i in range(rows):
+            for j in range(columns):
+                four_sigma_lsb = FOUR_SIGMA * noise_lsb[b, i, j]
+                amplitude, residual = amplitude_lsb[b, i, j], residual_lsb[b, i, j]
+                strong = valid[b, i, j]
+                two_m = abs(by_two_m[b, i, j] - distance_m[b, i, j])
+                four_m = abs(by_four_m[b, i, j] - distance_m[b, i, j])
+                apart_m = abs(by_two_m[b, i, j] - by_four_m[b, i, j])
+                counts[0, j] += strong
+                counts[1, j] += saturated[b, i, j]
+                sums[0, j] += amplitude
+                sums[1, j] += amplitude / (amplitude + four_sigma_lsb)
+                sums[2, j] += residual / (residual + four_sigma_lsb)
+                sums[3, j] += two_m / (two_m + scale_m) if strong else ZERO
+                sums[4, j] += four_m / (four_m + scale_m) if strong else ZERO
+                sums[5, j] += apart_m / (apart_m + scale_m) if strong else ZERO
+        found[0, b], found[1, b] = counts[0].sum(), counts[1].sum()
+        for k in range(6):
+            found[2 + k, b] = sums[k].sum()

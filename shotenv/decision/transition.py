@@ -24,9 +24,11 @@ from shotenv.laser import (
     LaserState,
     ShotCost,
     emitted_power_w,
+    heat_of,
     laser_step,
     shot_cost,
     start_laser,
+    warmed_k,
 )
 from unwrap.signal import Shots
 from unwrap.support import concatenate
@@ -172,9 +174,17 @@ def allowed_actions(problem: Problem, state: State) -> Tensor:
 
 def would_trip(problem: Problem, drive: Drive, laser: LaserState, shots: Tensor) -> Tensor:
     """Where taking `shots` [B] would trip a laser that works, bool [B]."""
-    cost = cost_of(problem, drive, shots, laser.temperature_k)
-    after = laser_step(laser, cost, drive.ambient_k, problem.config.laser, problem.frame_period_s)
-    return after.tripped & ~laser.tripped
+    config, before_k = problem.config.laser, laser.temperature_k
+    # Heat alone, and not the whole cost: every frame asks, often more than once.
+    heat_j = heat_of(
+        shots,
+        config,
+        optical_power_w=emitted_power_w(drive.laser_power_w, before_k, config),
+        temperature_k=before_k,
+        integration_s=drive.integration_s,
+    )
+    after_k, _ = warmed_k(laser, heat_j, drive.ambient_k, config, problem.frame_period_s)
+    return (after_k >= config.trip_k) & ~laser.tripped
 
 
 def cost_of(problem: Problem, drive: Drive, shots: Tensor, temperature_k: Tensor) -> ShotCost:

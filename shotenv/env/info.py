@@ -167,14 +167,19 @@ def info_of(columns: Columns, row: int) -> dict[str, Any]:
 def vector_info(columns: Columns, rows: np.ndarray, num_envs: int) -> dict[str, Any]:
     """Infos of the drives `rows` as gymnasium has them: with `_key`, which rows each key is of."""
     told: dict[str, Any] = {}
+    whole = len(rows) == num_envs and bool((rows[1:] > rows[:-1]).all())
     for name, values in columns.items():
         if isinstance(values, Mapping):
             told[name] = vector_info(dict(values), rows, num_envs)
+        elif whole:
+            # Nothing to put in order; most steps play all drives.
+            told[name] = values
         else:
             told[name] = np.zeros((num_envs, *values.shape[1:]), values.dtype)
             told[name][rows] = values
-        told[f"_{name}"] = np.zeros(num_envs, dtype=bool)
-        told[f"_{name}"][rows] = True
+        told[f"_{name}"] = np.full(num_envs, whole)
+        if not whole:
+            told[f"_{name}"][rows] = True
     return told
 
 

@@ -4,6 +4,7 @@ from .energy import (
     NetworkWork as NetworkWork,
     efficiency_at as efficiency_at,
     emitted_power_w as emitted_power_w,
+    heat_of as heat_of,
     shot_cost as shot_cost,
 )
 from .laser_state import (
@@ -11,5 +12,6 @@ from .laser_state import (
     laser_step as laser_step,
     start_laser as start_laser,
     too_bright as too_bright,
+    warmed_k as warmed_k,
 )
 from .thermal import case_step as case_step, junction_step as junction_step, trip_step as trip_step

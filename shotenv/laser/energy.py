@@ -62,6 +62,29 @@ def efficiency_at(temperature_k: Array, laser: LaserConfig) -> Array:
     return laser.efficiency - laser.efficiency_slope_per_k * above_k
 
 
+def electrical_power_w(optical_power_w: Array, temperature_k: Array, laser: LaserConfig) -> Array:
+    """What the laser takes while on, W.
+
+    Power and efficiency are those at the start of the frame, in which the junction warms by tenths
+    of a kelvin. Modulation is in `optical_power_w` already, a mean while on.
+    """
+    return optical_power_w / efficiency_at(temperature_k, laser)
+
+
+def heat_of(
+    shots: Tensor,
+    laser: LaserConfig,
+    *,
+    optical_power_w: Tensor,
+    temperature_k: Tensor,
+    integration_s: Tensor,
+) -> Tensor:
+    """What the laser leaves in its package, joules: `ShotCost.heat_j` alone, see `shot_cost`."""
+    on_s = shots * integration_s
+    electrical_w = electrical_power_w(optical_power_w, temperature_k, laser)
+    return on_s * electrical_w - on_s * optical_power_w
+
+
 @lru_cache(maxsize=64)
 def chip_energies_j(
     readout_j: float, static_j: float, gray_network_j: float, samples_network_j: float
@@ -110,10 +133,8 @@ def shot_cost(
     network : NetworkWork
         None by default.
     """
-    # Power and efficiency are those at the start of the frame, in which the junction warms by
-    # tenths of a kelvin. Modulation is in `optical_power_w` already, a mean while on.
     on_s = shots * integration_s
-    electrical_w = optical_power_w / efficiency_at(temperature_k, laser)
+    electrical_w = electrical_power_w(optical_power_w, temperature_k, laser)
     optical_j, laser_j = on_s * optical_power_w, on_s * electrical_w
     driver_j = on_s * laser.driver_power_w
     chips = chip_energies_j(

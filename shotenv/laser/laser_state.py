@@ -50,16 +50,23 @@ def laser_step(
     For constant power it is that power once several windows have passed; a standard's
     rectangular window has the same steady value.
     """
-    # Case and junction each answer the whole heat flow (see `thermal`); their sum is what trips.
-    rise_k = state.junction_rise_k
-    case_k = case_step(state.temperature_k - rise_k, cost.heat_j, ambient_k, laser, period_s)
-    if laser.junction_resistance_k_per_w:
-        rise_k = junction_step(rise_k, cost.heat_j, laser, period_s)
-    temperature_k = case_k + rise_k
+    temperature_k, rise_k = warmed_k(state, cost.heat_j, ambient_k, laser, period_s)
     eye_w = cost.optical_j / period_s
     if laser.eye_window_s:
         eye_w = relaxed(state.eye_power_w, eye_w, laser.eye_window_s, period_s)
     return LaserState(temperature_k, rise_k, eye_w, trip_step(state.tripped, temperature_k, laser))
+
+
+def warmed_k(
+    state: LaserState, heat_j: Tensor, ambient_k: Tensor, laser: LaserConfig, period_s: float
+) -> tuple[Tensor, Tensor]:
+    """Temperature and rise of the junction [B] one frame later, after `heat_j` [B]."""
+    # Case and junction each answer the whole heat flow (see `thermal`); their sum is what trips.
+    rise_k = state.junction_rise_k
+    case_k = case_step(state.temperature_k - rise_k, heat_j, ambient_k, laser, period_s)
+    if laser.junction_resistance_k_per_w:
+        rise_k = junction_step(rise_k, heat_j, laser, period_s)
+    return case_k + rise_k, rise_k
 
 
 def too_bright(state: LaserState, laser: LaserConfig) -> Tensor:

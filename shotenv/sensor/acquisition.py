@@ -18,7 +18,7 @@ from shotenv.sensor.exposure import Exposure
 from shotenv.sensor.offsets import OffsetPattern
 from shotenv.sensor.pixel_loops import IncidentLight, Pixel, mark_scored_, take_sample_
 from unwrap.signal import RawFrame, Shots
-from unwrap.support import array
+from unwrap.support import array, long_rows
 
 
 def expose(
@@ -130,15 +130,30 @@ def acquire_prefixes(
     saturated = np.zeros(shape, np.bool_)
     # A compiled loop does not broadcast, and reads on where an array ends: shapes are made equal
     # here, where a wrong one is still an error.
-    made = array(offsets.pattern_lsb.expand(shape)), pixel, dcs_lsb, saturated
+    pattern_lsb = array(offsets.pattern_lsb.expand(shape))
+    lit = light._replace(
+        correlation=long_rows(light.correlation),
+        active=long_rows(light.active),
+        ambient=long_rows(light.ambient),
+    )
+    fixed = long_rows(pattern_lsb), long_rows(row_parity(height, width)), pixel
+    made = long_rows(dcs_lsb), long_rows(saturated)
     taken: dict[Shots, RawFrame] = {}
     for number, normals in zip(range(shots), noise, strict=False):
-        take_sample_(number, light, array(normals), *made)
+        take_sample_(number, lit, long_rows(array(normals)), *fixed, *made)
         if number + 1 in ACQUISITIONS:
             # A copy: the samples to come go on marking pixels.
             samples = torch.from_numpy(dcs_lsb[:, : number + 1])
             taken[Shots(number + 1)] = RawFrame(samples, torch.from_numpy(saturated.copy()))
     return taken
+
+
+@lru_cache(maxsize=16)
+def row_parity(height: int, width: int) -> np.ndarray:
+    """1 in even and -1 in odd rows, float32 [H, W]; kept, since every acquisition asks for it."""
+    sign = np.ones((height, width), np.float32)
+    sign[1::2] = -1.0
+    return sign
 
 
 def scored_pixels(light: IncidentLight, truth_m: Tensor, sensor: SensorConfig) -> Tensor:
@@ -157,7 +172,8 @@ def scored_pixels(light: IncidentLight, truth_m: Tensor, sensor: SensorConfig) -
     scored = np.empty(light.active.shape, np.bool_)
     # float32, as everything in the loops; see `unwrap.support.loop`.
     limits = np.float32(sensor.max_range_m), np.float32(sensor.min_snr)
-    mark_scored_(light, pixel_of(sensor), array(truth_m), *limits, scored)
+    lit = light._replace(active=long_rows(light.active), ambient=long_rows(light.ambient))
+    mark_scored_(lit, pixel_of(sensor), long_rows(array(truth_m)), *limits, long_rows(scored))
     return torch.from_numpy(scored)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import torch
 from torch import Tensor
@@ -11,7 +13,7 @@ from shotenv.sensor.acquisition import pixel_of
 from shotenv.sensor.converter import full_scale_lsb
 from shotenv.sensor.electrons import electrons_per_radiance_second
 from shotenv.sensor.pixel_loops import noise_by_gray_, take_gray_
-from unwrap.support import array
+from unwrap.support import array, long_rows
 
 SHORTEST_EXPOSURE_S = 1e-5
 """What the light meter stops at in a scene however bright, s; assumed."""
@@ -68,6 +70,40 @@ def gray_gain_lsb_per_e(sensor: SensorConfig) -> float:
     return full_scale_lsb(sensor.adc_bits) / sensor.full_well_e
 
 
+class GrayNoise(NamedTuple):
+    """What tells the noise of a sample by the gray image; float32, fields of `noise_by_gray_`."""
+
+    variance_per_word: np.ndarray
+    dark: np.float32
+    offset_variance: np.ndarray
+    offset_per_word: np.ndarray
+    most_offset: np.float32
+
+
+def gray_noise(
+    exposure_s: Tensor,
+    integration_s: Tensor,
+    sensor: SensorConfig,
+    *,
+    offset_left_lsb: Tensor | None = None,
+) -> GrayNoise:
+    """The numbers of B frames; see `sample_noise_lsb`."""
+    frames = len(exposure_s)
+    # Electrons in the gray image, scaled from its exposure time to the sample's, are their own
+    # variance: LSB^2 of the sample per word of the gray image.
+    gain = sensor.gain_lsb_per_e**2 / gray_gain_lsb_per_e(sensor)
+    per_word, left, added = np.empty(frames, np.float32), *np.zeros((2, frames), np.float32)
+    # In float64, and rounded once as it is stored.
+    time_ratio = integration_s.numpy() / exposure_s.numpy()
+    per_word[:] = time_ratio * gain
+    if offset_left_lsb is not None:
+        left[:] = offset_left_lsb.numpy() ** 2
+        per_e = pixel_of(sensor).ambient_lsb_per_e
+        added[:] = time_ratio * float(per_e) / gray_gain_lsb_per_e(sensor)
+    dark, most = np.float32(dark_variance_lsb2(sensor)), np.float32(sensor.offset_ambient_lsb)
+    return GrayNoise(per_word, dark, left, added, most)
+
+
 def sample_noise_lsb(
     gray: Tensor,
     exposure_s: Tensor,
@@ -93,22 +129,10 @@ def sample_noise_lsb(
         leaves (`offset_left_lsb`). It and what ambient light adds then count as noise, so that two
         samples of nothing are as seldom valid as without any offset.
     """
-    # Electrons in the gray image, scaled from its exposure time to the sample's, are their own
-    # variance: LSB^2 of the sample per word of the gray image.
-    squared_gain = sensor.gain_lsb_per_e**2
-    gain, per_word = squared_gain / gray_gain_lsb_per_e(sensor), np.empty(len(gray), np.float32)
-    # In float64, and rounded once as it is stored.
-    time_ratio = integration_s.numpy() / exposure_s.numpy()
-    per_word[:] = time_ratio * gain
-    left, added = np.zeros(len(gray), np.float32), np.zeros(len(gray), np.float32)
-    if offset_left_lsb is not None:
-        left[:] = offset_left_lsb.numpy() ** 2
-        per_e = pixel_of(sensor).ambient_lsb_per_e
-        added[:] = time_ratio * float(per_e) / gray_gain_lsb_per_e(sensor)
+    exposures_s = exposure_s.expand(len(gray))
+    known = gray_noise(exposures_s, integration_s, sensor, offset_left_lsb=offset_left_lsb)
     noise_lsb = np.empty(gray.shape, np.float32)
-    dark = np.float32(dark_variance_lsb2(sensor))
-    most = np.float32(sensor.offset_ambient_lsb)
-    noise_by_gray_(array(gray, None), per_word, dark, left, added, most, noise_lsb)
+    noise_by_gray_(long_rows(array(gray, None)), *known, long_rows(noise_lsb))
     return torch.from_numpy(noise_lsb)
 
 

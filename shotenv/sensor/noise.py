@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Iterator, Sequence
-from itertools import islice
+from itertools import count, islice
 
+import numpy as np
 import torch
 from torch import Tensor
+
+from shotenv.sensor.normals import BLOCK, fill_normals_
 
 _MASK = (1 << 64) - 1  # Python's integers do not wrap round by themselves.
 
@@ -45,25 +48,25 @@ def stream(purpose: Purpose, *words: int) -> torch.Generator:
 
 
 def noise_samples(
-    seeds: Sequence[int], frames: Sequence[int], height: int, width: int
+    seeds: Sequence[int] | Tensor, frames: Sequence[int] | Tensor, height: int, width: int
 ) -> Iterator[Tensor]:
     """Standard normals of a batch of acquisitions, sample after sample without end.
 
-    Each stream belongs to its (seed, frame), and each sample is one draw from it, so that the
-    noise of fewer shots is a prefix of the noise of more.
+    Each is a function of (seed, frame, sample, tap, pixel), so that the noise of fewer shots is a
+    prefix of the noise of more, and that of a frame does not depend on what else is in the batch.
 
     Yields
     ------
     float32 [B, 2, height, width]
         Of tap A and tap B, one sample for each of the B pairs of `seeds` and `frames`.
     """
-    streams = [stream(Purpose.NOISE, *words) for words in zip(seeds, frames, strict=True)]
-    while True:
-        # A new tensor each time: whoever keeps a sample must not see the next one written over it.
-        normals = torch.empty(len(streams), 2, height, width)
-        for one, generator in zip(normals, streams, strict=True):
-            one.normal_(generator=generator)
-        yield normals
+    of = np.asarray(seeds, np.int64), np.asarray(frames, np.int64)
+    words = np.empty((4, BLOCK), np.uint32)
+    for pair in count():
+        # New ones each time: whoever keeps a sample must not see the next one written over it.
+        normals = np.empty((2, len(of[0]), 2, height * width), np.float32)
+        fill_normals_(int(Purpose.NOISE), *of, pair, words, normals)
+        yield from torch.from_numpy(normals).unflatten(-1, (height, width)).unbind()
 
 
 def draw_noise(seed: int, frame: int, shots: int, height: int, width: int) -> Tensor:

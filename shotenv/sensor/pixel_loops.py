@@ -54,7 +54,7 @@ class Pixel(NamedTuple):
     gain_lsb_per_e
         Converter gain.
     ambient_lsb_per_e
-        Offset that ambient light adds, of opposite sign in even and odd rows.
+        Offset that ambient light adds, of opposite sign in even and odd rows of the imager.
     low_lsb, high_lsb
         Samples of the lowest and the highest word.
     shot_noise
@@ -133,6 +133,7 @@ def take_sample_(
     light: IncidentLight,
     normals: Array,
     pattern_lsb: Array,
+    parity: Array,
     pixel: Pixel,
     dcs_lsb: Array,
     saturated: Array,
@@ -150,6 +151,8 @@ def take_sample_(
         Standard normals of tap A and tap B.
     pattern_lsb : float32 [B, H, W]
         Fixed offset of each pixel.
+    parity : float32 [H, W]
+        1 or -1, the sign of the offset that ambient light adds.
     dcs_lsb : float32 [B, n, H, W]
         The sample is written into it.
     saturated : bool [B, H, W]
@@ -168,7 +171,7 @@ def take_sample_(
         # Half of the contrast in each tap: what one gains the other loses.
         swing_e = HALF * pixel.contrast * active_e
         for i in range(rows):
-            parity = pixel.ambient_lsb_per_e if i % 2 == 0 else -pixel.ambient_lsb_per_e
+            sign = parity[i]
             active, ambient = light.active[b, i], light.ambient[b, i]
             correlation, pattern = light.correlation[b, number, i], pattern_lsb[b, i]
             normal_a, normal_b = normals[b, 0, i], normals[b, 1, i]
@@ -180,8 +183,8 @@ def take_sample_(
                 half_e = correlation[j] * swing_e
                 a_e = noisy_e(packet_e(mean_e + half_e, pixel.read_variance_e), normal_a[j])
                 b_e = noisy_e(packet_e(mean_e - half_e, pixel.read_variance_e), normal_b[j])
-                offset_lsb = pattern[j] + ambient_offset_lsb(
-                    background_e, pixel.full_well_e, parity
+                offset_lsb = pattern[j] + sign[j] * ambient_offset_lsb(
+                    background_e, pixel.full_well_e, pixel.ambient_lsb_per_e
                 )
                 word = word_lsb(
                     offset_lsb + pixel.gain_lsb_per_e * (a_e - b_e), pixel.low_lsb, pixel.high_lsb
@@ -206,8 +209,8 @@ def take_sample_(
                 if mean_e + abs(half_e) > free_e:
                     a_e = clipped_e(max(mean_e + half_e, ZERO), normal_a[j], pixel)
                     b_e = clipped_e(max(mean_e - half_e, ZERO), normal_b[j], pixel)
-                    offset_lsb = pattern[j] + ambient_offset_lsb(
-                        background_e, pixel.full_well_e, parity
+                    offset_lsb = pattern[j] + sign[j] * ambient_offset_lsb(
+                        background_e, pixel.full_well_e, pixel.ambient_lsb_per_e
                     )
                     words[j] = word_lsb(
                         offset_lsb + pixel.gain_lsb_per_e * (a_e - b_e),

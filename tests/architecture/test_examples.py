@@ -7,6 +7,7 @@ import importlib.util
 import json
 import math
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -92,6 +93,30 @@ def test_the_notebook_runs_from_top_to_bottom(monkeypatch, tiny_kwargs, capsys):
             assert cell["outputs"] == [], "committed without outputs"
             exec("".join(cell["source"]), names)
     assert "always 8: return" in capsys.readouterr().out
+
+
+RUNNER = """
+import gymnasium
+from gymnasium.wrappers.vector import DictInfoToList
+single = gymnasium.make({env_id!r})
+envs = DictInfoToList(
+    gymnasium.make_vec({env_id!r}, 2, vectorization_mode=gymnasium.VectorizeMode.VECTOR_ENTRY_POINT)
+)
+observations, infos = envs.reset(seed=0)
+assert (observations[0] == single.reset(seed=0)[0]).all() and len(infos) == 2
+"""
+
+
+def test_a_runner_of_rllib_finds_the_environment():
+    """RLlib is not installed here: what it does with the example's id in a process of its own."""
+    source = (ROOT / "examples" / "rllib.py").read_text("utf-8")
+    compile(source, "rllib.py", "exec")
+    (env_id,) = re.findall(r'^ENV_ID = "(.+)"', source, re.MULTILINE)
+    assert env_id == "shotenv:shotenv/ShotSchedule-v0" and "VECTOR_ENTRY_POINT" in source
+    told = subprocess.run(
+        [sys.executable, "-c", RUNNER.format(env_id=env_id)], capture_output=True, text=True
+    )
+    assert told.returncode == 0, told.stderr
 
 
 @pytest.mark.parametrize("name", WITH_EXAMPLES)

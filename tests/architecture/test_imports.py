@@ -103,6 +103,7 @@ PLAYING = (*SIGNAL, *ENVIRONMENT, "agents.config", "agents.policies", "agents.op
 room("agents.evaluation", *PLAYING)
 room("agents.training", *PLAYING, "agents.evaluation")
 room("agents.report", *PLAYING, "unwrap.pictures", "agents.evaluation")
+room("agents.deploy", *SIGNAL, "agents.policies")
 room("agents", "agents.policies", "agents.training")
 room("agents.cli", *ROOMS)
 
@@ -118,8 +119,8 @@ ONLY_IN = {
     "minari": "agents/evaluation/",
     "jinja2": ("agents/report/", "unwrap/comparison/"),
     "PIL": ("unwrap/pictures/", "unwrap/recordings/", "unwrap/comparison/", "shotenv/"),
-    "onnx": "unwrap/export/",
-    "onnxruntime": "unwrap/export/",
+    "onnx": ("unwrap/export/", "agents/deploy/"),
+    "onnxruntime": ("unwrap/export/", "agents/deploy/"),
     "openvino": "unwrap/networks/",
 }
 SOURCES = sorted(

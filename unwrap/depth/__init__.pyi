@@ -7,13 +7,23 @@ from .correction import (
     Eight as Eight,
     correct as correct,
     correct_sensed as correct_sensed,
+    merge_limits as merge_limits,
+    shift_in_turns as shift_in_turns,
+    turns_table as turns_table,
 )
-from .dual import unwrap_dual as unwrap_dual
+from .dual import (
+    DualLimits as DualLimits,
+    dual_limits as dual_limits,
+    fuse_pixels as fuse_pixels,
+    unwrap_dual as unwrap_dual,
+)
 from .kernel_density import unwrap_kernel_density as unwrap_kernel_density
 from .merge import (
     RULES as RULES,
+    Limits as Limits,
     Merge as Merge,
     merge_nearest as merge_nearest,
+    merge_pixels as merge_pixels,
     merge_regression as merge_regression,
     merge_segmentation as merge_segmentation,
     nearest_wraps as nearest_wraps,

@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from unwrap.depth.dual import unwrap_dual
+from unwrap.depth.dual import dual_limits, fuse_pixels, unwrap_dual
 from unwrap.depth.kernel_density import unwrap_kernel_density
 from unwrap.depth.merge import RULES, Limits, Merge, merge_pixels
 from unwrap.signal import (
@@ -24,6 +24,7 @@ from unwrap.signal import (
     Sensed,
     SensorDescription,
     Shots,
+    TurnsTable,
     angle_rad,
     decode_at,
     distance_m,
@@ -33,7 +34,7 @@ from unwrap.signal import (
     samples_at,
     unambiguous_range_m,
 )
-from unwrap.support import array, array_of, can_loop
+from unwrap.support import array, array_of, can_loop, long_rows
 
 Eight = Literal["two_frequency", "kernel_density", "network"]
 """Who tells the wraps of eight samples, see `correct`."""
@@ -110,6 +111,8 @@ def correct(
     calibration = _Calibration(sensor, offset_lsb, noise, shift_m)
     if raw.shots == Shots.EIGHT:
         if eight == "two_frequency":
+            if predicted_m is not None and _can_loop(raw, predicted_m):
+                return _by_two_loops(raw, predicted_m, calibration, merge)
             return _by_two_frequencies(raw, predicted_m, calibration, merge)
         if eight == "kernel_density":
             return _by_vote(raw, predicted_m, calibration, merge)
@@ -243,26 +246,67 @@ def _by_loop(
     # alone, and lie in the processor's cache, where new memory would have to be fetched.
     phase_rad, depth_m = angle_rad(sine, cosine, out=cosine), sine
     valid = torch.empty(raw.saturated.shape, dtype=torch.bool)
-    unambiguous_m = unambiguous_range_m(sensor.f1_hz)
-    shift_turns = np.zeros(len(valid), np.float32)
-    if shift_m is not None:
-        # Python's remainder, in float64 and never negative, as in `shift_turns_`.
-        shift_turns[:] = shift_m.numpy() % unambiguous_m / unambiguous_m
     merge_pixels(
-        array(phase_rad),
-        (FLAT if sensor.wiggle is None else sensor.wiggle[0]).turns_table,
-        shift_turns,
-        array(amplitude),
-        array_of(calibration.noise_lsb, valid.shape),
-        array(raw.saturated, np.bool_),
-        array(predicted_m),
-        Limits(*map(np.float32, (unambiguous_m, sensor.saturation_range_m, sensor.min_snr))),
+        long_rows(array(phase_rad)),
+        turns_table(0, sensor),
+        shift_in_turns(0, sensor, shift_m, len(valid)),
+        long_rows(array(amplitude)),
+        long_rows(array_of(calibration.noise_lsb, valid.shape)),
+        long_rows(array(raw.saturated, np.bool_)),
+        long_rows(array(predicted_m)),
+        merge_limits(sensor),
         RULES[merge].branch,
         # Written to; both are contiguous, so that `array` gives their own memory.
-        array(depth_m),
-        array(valid, np.bool_),
+        long_rows(array(depth_m)),
+        long_rows(array(valid, np.bool_)),
     )
+    unambiguous_m = unambiguous_range_m(sensor.f1_hz)
     return DepthFrame(depth_m, valid, phase_rad, amplitude, residual, unambiguous_m)
+
+
+def _by_two_loops(
+    raw: RawFrame, predicted_m: Tensor, calibration: _Calibration, merge: Merge
+) -> DepthFrame:
+    """Eight samples by two frequencies, by compiled loops: as four, and then by f2 as well."""
+    sensor, shift_m = calibration.sensor, calibration.shift_m
+    depth = _by_loop(RawFrame(samples_at(0, raw), raw.saturated), predicted_m, calibration, merge)
+    cosine, sine, amplitude, _ = quadratures(samples_at(1, raw), calibration.offset_lsb)
+    fuse_pixels(
+        long_rows(array(depth.phase_rad)),
+        long_rows(array(angle_rad(sine, cosine, out=cosine))),
+        turns_table(1, sensor),
+        shift_in_turns(1, sensor, shift_m, len(predicted_m)),
+        long_rows(array(amplitude)),
+        long_rows(array_of(calibration.noise_lsb, predicted_m.shape)),
+        long_rows(array(depth.valid, np.bool_)),
+        dual_limits(sensor),
+        # Written to; contiguous, so that `array` gives its own memory.
+        long_rows(array(depth.distance_m)),
+    )
+    return depth
+
+
+def merge_limits(sensor: SensorDescription) -> Limits:
+    """Constants of a sensor for `merge_pixels`."""
+    unambiguous_m = unambiguous_range_m(sensor.f1_hz)
+    return Limits(*map(np.float32, (unambiguous_m, sensor.saturation_range_m, sensor.min_snr)))
+
+
+def turns_table(frequency: int, sensor: SensorDescription) -> TurnsTable:
+    """The stored phase error at f1 (0) or f2 (1) for compiled loops."""
+    return (FLAT if sensor.wiggle is None else sensor.wiggle[frequency]).turns_table
+
+
+def shift_in_turns(
+    frequency: int, sensor: SensorDescription, shift_m: Tensor | None, frames: int
+) -> np.ndarray:
+    """`shift_m` of each frame in turns of f1 (0) or f2 (1), float32 [B], not negative."""
+    turns = np.zeros(frames, np.float32)
+    if shift_m is not None:
+        unambiguous_m = unambiguous_range_m((sensor.f1_hz, sensor.f2_hz)[frequency])
+        # Python's remainder, in float64 and never negative, as in `shift_turns_`.
+        turns[:] = shift_m.numpy() % unambiguous_m / unambiguous_m
+    return turns
 
 
 def correct_sensed(

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor
 
-from unwrap.signal import distance_m, unambiguous_range_m
+from unwrap.signal import SensorDescription, TurnsTable, distance_m, unambiguous_range_m
+from unwrap.support import loop
+
+Array = np.ndarray
+# float32, since a Python float would make the arithmetic of a loop float64.
+ZERO, FAR, TWO_PI = np.float32(0.0), np.float32(1e9), np.float32(2 * np.pi)
 
 
 def unwrap_dual(
@@ -94,3 +101,110 @@ def _best_wraps(gap: Tensor, wrap: float, count: int) -> Tensor:
         torch.ge(turned, (low + high) / 2.0 + 1.0 - start, out=beyond)
         wraps.add_(beyond, alpha=after - before)
     return wraps
+
+
+class DualLimits(NamedTuple):
+    """Constants of two frequencies for `fuse_pixels`, float32 but for the last wrap of f1.
+
+    Attributes
+    ----------
+    range1_m, range2_m
+        Unambiguous ranges.
+    share2
+        Weight of the second distance.
+    last, last_ends_m
+        Last wrap of f1 that begins within the range, and the wrapped distance where the range ends
+        in it.
+    max_residual_m, min_snr
+        As in `SensorDescription`.
+    """
+
+    range1_m: np.float32
+    range2_m: np.float32
+    share2: np.float32
+    last: int
+    last_ends_m: np.float32
+    max_residual_m: np.float32
+    min_snr: np.float32
+
+
+def dual_limits(sensor: SensorDescription) -> DualLimits:
+    """The constants of a sensor."""
+    range1_m, range2_m = map(unambiguous_range_m, (sensor.f1_hz, sensor.f2_hz))
+    last = math.floor(sensor.max_range_m / range1_m)
+    share2 = sensor.f2_hz**2 / (sensor.f1_hz**2 + sensor.f2_hz**2)
+    ends_m = sensor.max_range_m - last * range1_m if last else float(FAR)
+    return DualLimits(
+        range1_m=np.float32(range1_m),
+        range2_m=np.float32(range2_m),
+        share2=np.float32(share2),
+        last=last,
+        last_ends_m=np.float32(ends_m),
+        max_residual_m=np.float32(sensor.max_residual_m),
+        min_snr=np.float32(sensor.min_snr),
+    )
+
+
+@loop
+def fuse_pixels(
+    phase1_rad: Array,
+    angle2_rad: Array,
+    turns_table: TurnsTable,
+    shift_turns: Array,
+    amplitude2: Array,
+    noise: Array,
+    valid: Array,
+    limits: DualLimits,
+    distance_m: Array,
+) -> None:
+    """Distances by two frequencies where these agree; maps are [B, H, W], float32 or bool.
+
+    What `correct` does with `unwrap_dual` and torch in fifty passes, candidate by candidate.
+
+    Parameters
+    ----------
+    phase1_rad, angle2_rad
+        Phase at f1 in [0, 2 pi); atan2 of the quadratures at f2.
+    turns_table, shift_turns : TurnsTable, float32 [B]
+        Of f2, see `merge_pixels`.
+    amplitude2, noise, valid
+        Amplitude at f2, the noise of a sample, and where the signal at f1 may be used.
+    distance_m
+        Is written where pixels are valid, f2 is strong, and the frequencies agree.
+    """
+    range1_m, range2_m = limits.range1_m, limits.range2_m
+    per_rad1, per_rad2 = range1_m / TWO_PI, range2_m / TWO_PI
+    per_m, wrap = np.float32(1.0) / range2_m, range1_m / range2_m
+    constant, slope, first, bins_per_rad = turns_table
+    frames, rows, columns = phase1_rad.shape
+    # Disagreements are held in wraps of f2: its nearest wrap is then found by rounding.
+    gap, wraps = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    apart = np.empty(columns, np.float32)
+    for b in range(frames):
+        for i in range(rows):
+            phase1, angle2, strength = phase1_rad[b, i], angle2_rad[b, i], amplitude2[b, i]
+            deviation, good, out = noise[b, i], valid[b, i], distance_m[b, i]
+            for j in range(columns):
+                place = first + bins_per_rad * angle2[j]
+                line = np.uint32(place)  # With a sign Numba would test for indices from the end.
+                gap[j] = constant[line] + slope[line] * place + shift_turns[b]
+            for j in range(columns):
+                phase2_rad = (gap[j] - np.floor(gap[j])) * TWO_PI
+                gap[j] = (phase1[j] * per_rad1 - phase2_rad * per_rad2) * per_m
+                apart[j], wraps[j] = FAR, ZERO
+            for n in range(limits.last + 1):
+                number = np.float32(n)
+                ends_m = limits.last_ends_m if n == limits.last else FAR
+                for j in range(columns):
+                    turns = gap[j] + number * wrap
+                    off = turns - np.rint(turns)
+                    nearer = (abs(off) < abs(apart[j])) & (phase1[j] * per_rad1 < ends_m)
+                    apart[j] = off if nearer else apart[j]
+                    wraps[j] = number if nearer else wraps[j]
+            for j in range(columns):
+                fused_m = phase1[j] * per_rad1 + wraps[j] * range1_m
+                fused_m = max(fused_m - limits.share2 * range2_m * apart[j], ZERO)
+                agree = (abs(apart[j]) * range2_m <= limits.max_residual_m) & (
+                    strength[j] - limits.min_snr * deviation[j] >= ZERO
+                )
+                out[j] = fused_m if agree & good[j] else out[j]

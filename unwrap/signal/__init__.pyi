@@ -1,8 +1,10 @@
 from .calibrated import decode_at as decode_at, phase_at as phase_at, samples_at as samples_at
 from .decoding import (
     TWO_PI as TWO_PI,
+    angle_pixels as angle_pixels,
     angle_rad as angle_rad,
     decode as decode,
+    decode_pixels as decode_pixels,
     distance_m as distance_m,
     quadratures as quadratures,
 )

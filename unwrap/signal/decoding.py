@@ -17,14 +17,23 @@ from torch import Tensor
 
 from unwrap.signal.frames import PhaseFrame
 from unwrap.signal.frequencies import unambiguous_range_m
-from unwrap.support import array, array_of, can_loop, loop
+from unwrap.support import array, array_of, can_loop, long_rows, loop
 
 Array = np.ndarray
 # float32, since a Python float would make the arithmetic of a loop float64.
 HALF, ZERO = np.float32(0.5), np.float32(0.0)
-VECTOR, PART, THREADS = 64, 32768, 64
-"""Numbers that fill whole vectors of any processor; the least that torch gives to a thread; and
-the most threads that it shares maps among."""
+PI, HALF_PI, TINY = np.float32(np.pi), np.float32(np.pi / 2), np.float32(1e-30)
+ARC_TANGENT = tuple(
+    map(
+        np.float32,
+        (
+            *(0.00282363896258175373, -0.0159569028764963150, 0.0425049886107444763),
+            *(-0.0748900920152664185, 0.106347933411598206, -0.142027363181114197),
+            *(0.199926957488059998, -0.333331018686294556),
+        ),
+    )
+)
+"""Polynomial of `angle_pixels`, highest power first."""
 TWO_PI = 2 * math.pi
 BELOW_TWO_PI = float(np.nextafter(np.float32(TWO_PI), np.float32(0)))
 """Largest float32 phase of a period."""
@@ -73,18 +82,42 @@ def decode(dcs: Tensor, *, offset_lsb: Tensor | None = None) -> PhaseFrame:
 
 
 def angle_rad(sine: Tensor, cosine: Tensor, *, out: Tensor | None = None) -> Tensor:
-    """`torch.atan2`, the same to the last bit whatever else is in the batch.
+    """The angle in [-pi, pi] whose sine and cosine have this ratio.
 
-    torch computes in vectors of some numbers, and what is left over by another function, whose last
-    bit may differ. So maps are filled up to whole vectors, in each of the parts that threads take.
+    Written twice: a compiled loop for maps on the processor, which has the same bits on every
+    machine and whatever else is in the batch, and `torch.atan2`, which has not, for the rest.
     """
-    count = sine.numel()
-    missing = -count % (VECTOR if count <= PART else THREADS * VECTOR)
-    if not missing or not can_loop(sine, cosine):
+    if not can_loop(sine, cosine) or sine.shape != cosine.shape:
         return torch.atan2(sine, cosine, out=out)
-    filled = (torch.cat((maps.reshape(-1), maps.new_ones(missing))) for maps in (sine, cosine))
-    found = torch.atan2(*filled)[:count].view(sine.shape)
-    return found if out is None else out.copy_(found)
+    found = torch.empty_like(sine, memory_format=torch.contiguous_format) if out is None else out
+    angles = found if found.is_contiguous() else torch.empty(found.shape)
+    angle_pixels(array(sine).reshape(-1), array(cosine).reshape(-1), array(angles).reshape(-1))
+    return found if angles is found else found.copy_(angles)
+
+
+@loop
+def angle_pixels(sine: Array, cosine: Array, angle: Array) -> None:
+    """atan2 of N numbers, float32, within 3e-7; of two zeros 0. `angle` may be one of the others.
+
+    The arc tangent is a polynomial from 0 to 1 (N. Shibata, SLEEF), and symmetric beyond.
+    """
+    for i in range(len(angle)):
+        x, y = abs(cosine[i]), abs(sine[i])
+        # Never 0 / 0, which is no number; smaller numbers than these are no samples.
+        ratio = min(x, y) / max(max(x, y), TINY)
+        squared = ratio * ratio
+        series = ARC_TANGENT[0]
+        series = series * squared + ARC_TANGENT[1]
+        series = series * squared + ARC_TANGENT[2]
+        series = series * squared + ARC_TANGENT[3]
+        series = series * squared + ARC_TANGENT[4]
+        series = series * squared + ARC_TANGENT[5]
+        series = series * squared + ARC_TANGENT[6]
+        series = series * squared + ARC_TANGENT[7]
+        found = ratio + ratio * squared * series
+        found = HALF_PI - found if y > x else found
+        found = PI - found if cosine[i] < ZERO else found
+        angle[i] = np.copysign(found, sine[i])
 
 
 def quadratures(
@@ -132,7 +165,8 @@ def _by_loop(
     # One block for all four maps. Two samples leave that of the residual unwritten; it is not
     # handed out then.
     maps = np.empty((4, len(samples), height, width), np.float32)
-    if not decode_pixels(array(samples), offset.reshape(maps[0].shape), *maps):
+    offset = offset.reshape(maps[0].shape)
+    if not decode_pixels(*map(long_rows, (array(samples), offset, *maps))):
         # The loop only tells that some sample is not finite; the error says which.
         _check_values(dcs)
     cosine, sine, amplitude, residual = torch.from_numpy(maps).view(4, *shape).unbind()

@@ -2,8 +2,11 @@ from .compiled import (
     array as array,
     array_of as array_of,
     can_loop as can_loop,
+    in_parts as in_parts,
     inlined as inlined,
+    long_rows as long_rows,
     loop as loop,
+    source_stamp as source_stamp,
 )
 from .error_text import in_one_line as in_one_line
 from .files import write_bytes as write_bytes, write_json as write_json, write_text as write_text

@@ -8,7 +8,14 @@ bit.
 
 from __future__ import annotations
 
+import inspect
+import os
+import zlib
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numba
@@ -17,6 +24,9 @@ from numba.extending import register_jitable
 
 if TYPE_CHECKING:  # Processes that render start without torch.
     from torch import Tensor
+
+ONE_ROW = 1024
+"""Most pixels that a loop takes as one row."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -47,6 +57,49 @@ def loop(function: Function) -> Function:
         return numba.njit(**options)(function)
 
 
+def in_parts(function: Callable[[int, int], Any], count: int, *, least: int) -> list[Any]:
+    """`function` of (begin, end) for parts of 0..count, side by side on torch's number of threads.
+
+    It should be a compiled loop, which leaves Python to others, over things that do not depend on
+    each other: then the parts make no difference to the numbers.
+
+    Parameters
+    ----------
+    least : int
+        Fewest that are worth a thread.
+
+    Examples
+    --------
+    >>> in_parts(lambda begin, end: (begin, end), 3, least=5)
+    [(0, 3)]
+    """
+    import torch  # Not at the top: see above.
+
+    threads = max(min(torch.get_num_threads(), count // least), 1)
+    ends = [count * (part + 1) // threads for part in range(threads)]
+    if threads == 1:
+        return [function(0, count)]
+    pool = _pool(os.getpid(), threads - 1)
+    others = [pool.submit(function, *part) for part in pairwise(ends)]
+    return [function(0, ends[0]), *(other.result() for other in others)]
+
+
+@lru_cache(maxsize=2)
+def _pool(process: int, threads: int) -> ThreadPoolExecutor:
+    # By the process, for threads do not live on in one that is forked.
+    return ThreadPoolExecutor(threads, thread_name_prefix="shotenv")
+
+
+def source_stamp(*loops: Any) -> int:
+    """Number that changes with the files in which `loops` stand, for a loop that calls them.
+
+    As a variable of the enclosing function it is part of what Numba knows a loop by, and machine
+    code kept for former files is not taken for that of the present ones.
+    """
+    files = sorted({inspect.getfile(one.py_func) for one in loops})
+    return zlib.crc32(b"".join(Path(file).read_bytes() for file in files))
+
+
 def inlined(function: Function) -> Function:
     """`function` of numbers, which Python calls as it is and compiled loops inline."""
     return register_jitable(inline="always")(function)
@@ -55,6 +108,24 @@ def inlined(function: Function) -> Function:
 def array(tensor: Tensor, dtype: type | None = np.float32) -> np.ndarray:
     """The memory of `tensor` as a contiguous array; a copy where it is not, or of another type."""
     return np.ascontiguousarray(tensor.numpy(), dtype)
+
+
+def long_rows(maps: np.ndarray, most: int = ONE_ROW) -> np.ndarray:
+    """Contiguous maps [..., H, W] for a loop over rows, several short rows being taken as one.
+
+    For loops that do not ask for rows: what comes before and after the vector instructions of a
+    loop is a large part of a short row. A row has at most `most` pixels, or is left as it is.
+
+    Examples
+    --------
+    >>> long_rows(np.zeros((64, 15, 20))).shape, long_rows(np.zeros((64, 15, 20)), 64).shape
+    ((64, 1, 300), (64, 5, 60))
+    >>> long_rows(np.zeros((1, 120, 160)), 64).shape
+    (1, 120, 160)
+    """
+    *leading, height, width = maps.shape
+    together = next((n for n in range(height, 1, -1) if height % n == 0 and n * width <= most), 1)
+    return maps.reshape(*leading, height // together, width * together)
 
 
 def array_of(value: Tensor | float, shape: Sequence[int]) -> np.ndarray:

@@ -10,7 +10,7 @@ from safetensors.torch import load_file
 from agents.cli.doctor import Finding
 from agents.cli.entry import COMMANDS, main
 from agents.evaluation.play import play_drives
-from agents.policies.learned import PpoPolicy
+from agents.policies.learned import NetworkPolicy
 from agents.report.results import FRAMES, RESULTS, TIMELINE, write_strip
 from agents.training.ppo import CHECKPOINT
 from shotenv.config.families import FAMILIES
@@ -74,7 +74,10 @@ def test_an_interrupted_training_of_the_command_line_goes_on(capsys, monkeypatch
 
     def interrupting(policy, *rest, **options):
         judged.append(policy)
-        if isinstance(policy, PpoPolicy) and sum(isinstance(p, PpoPolicy) for p in judged) == 3:
+        if (
+            isinstance(policy, NetworkPolicy)
+            and sum(isinstance(p, NetworkPolicy) for p in judged) == 3
+        ):
             raise KeyboardInterrupt
         return played(policy, *rest, **options)
 

@@ -22,8 +22,9 @@ from agents.optimum.dynamic import clairvoyant
 from agents.optimum.outcome_table import play
 from agents.optimum.tabulation import tabulate
 from agents.policies.fixed import FixedPolicy, RandomPolicy
-from agents.policies.learned import PpoPolicy
+from agents.policies.learned import NetworkPolicy
 from agents.policies.rules import SnrThresholdPolicy
+from agents.policies.score_networks import score_network
 from agents.report.evaluation_files import write_evaluation
 from agents.report.page import write_report
 from agents.report.strip import take_strip
@@ -214,6 +215,7 @@ def test_train_and_evaluate_write_everything_the_report_needs(config, tmp_path):
     rows = (tmp_path / "drives.csv").read_text().splitlines()
     assert len(rows) == 1 + len(evaluation.played) * len(SEEDS)
     # A scheduler of another environment: its network would read other numbers as its features.
-    other = PpoPolicy(scheduler.network, scheduler.config, ("heat_margin",))
+    told = scheduler.provenance.model_copy(update={"feature_names": ("heat_margin",)})
+    other = NetworkPolicy(score_network((1, 3), "tanh"), told)
     with pytest.raises(ValueError, match="other features"):
         evaluate_scheduler(config, other)

@@ -1,12 +1,7 @@
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from agents.config.agent import AgentConfig
 from agents.policies.fixed import CyclePolicy, FixedPolicy, RandomPolicy
-from agents.policies.learned import PpoPolicy, build_network
 from agents.policies.rules import SnrThresholdPolicy
 
 NAMES = ("gray_mean", "signal_to_noise", "time_left")
@@ -56,19 +51,6 @@ def test_threshold_compares_the_named_feature():
     assert policy.act(observation[0]) == 2
 
 
-def test_saved_scheduler_decides_the_same(tmp_path: Path):
-    config = AgentConfig(hidden=(8,))
-    policy = PpoPolicy(build_network(3, config), config, NAMES)
-    policy.save(tmp_path / "agent")
-    loaded = PpoPolicy.load(tmp_path / "agent")
-    observation = np.random.default_rng(0).normal(size=(64, 3)).astype(np.float32) * 10
-    chosen = policy.act(observation)
-    assert len(np.unique(chosen)) > 1, "else any network would do"
-    np.testing.assert_array_equal(chosen, loaded.act(observation))
-    assert loaded.config == config and loaded.feature_names == NAMES
-    assert isinstance(loaded.act(observation[0]), int)
-
-
 def test_wrong_arguments_are_named():
     with pytest.raises(ValueError, match="shots is 3; expected 2, 4 or 8"):
         FixedPolicy(3)
@@ -76,53 +58,3 @@ def test_wrong_arguments_are_named():
         CyclePolicy(1)
     with pytest.raises(ValueError, match="no 'signal_to_noise'"):
         SnrThresholdPolicy(("gray_mean",), 0.0, 8, 2)
-
-
-def test_missing_and_damaged_schedulers_are_named(tmp_path: Path):
-    with pytest.raises(ValueError, match=r"agent\.json is missing"):
-        PpoPolicy.load(tmp_path)
-    config = AgentConfig(hidden=(8,))
-    PpoPolicy(build_network(3, config), config, NAMES).save(tmp_path)
-    (tmp_path / "policy.safetensors").write_bytes(b"\x80\x04not tensors")
-    with pytest.raises(ValueError, match=r"policy\.safetensors is not a usable network"):
-        PpoPolicy.load(tmp_path)
-    (tmp_path / "agent.json").write_text(json.dumps({"schema": 99}))
-    with pytest.raises(ValueError, match="schema 99"):
-        PpoPolicy.load(tmp_path)
-    (tmp_path / "agent.json").write_text("{")
-    with pytest.raises(ValueError, match="damaged"):
-        PpoPolicy.load(tmp_path)
-
-
-def without(content, key):
-    return {name: value for name, value in content.items() if name != key}
-
-
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        (lambda saved: without(saved, "schema"), "is damaged; expected the description"),
-        (lambda saved: [saved], "is damaged; expected the description"),
-        (lambda saved: saved | {"schema": 2}, "schema 2, but this version reads 4; train the"),
-        (lambda saved: without(saved, "agent"), "agent: field required; expected what `shotenv"),
-        (lambda saved: without(saved, "feature_names"), "feature_names: field required"),
-        (lambda saved: saved | {"mood": 1}, "mood: extra inputs are not permitted, got 1; exp"),
-        (
-            lambda saved: saved | {"agent": saved["agent"] | {"algorithm": "ppo"}},
-            "agent.algorithm: extra inputs are not permitted, got 'ppo'; expected",
-        ),
-        (
-            lambda saved: saved | {"agent": saved["agent"] | {"gamma": 3}},
-            "agent.gamma: input should be less than or equal to 1, got 3; expected",
-        ),
-        (lambda saved: saved | {"feature_names": [1]}, "feature_names.0: input should be a valid"),
-    ],
-)
-def test_a_description_that_cannot_be_used_names_file_and_field(tmp_path, change, says):
-    config = AgentConfig(hidden=(8,))
-    PpoPolicy(build_network(3, config), config, NAMES).save(tmp_path)
-    path = tmp_path / "agent.json"
-    path.write_text(json.dumps(change(json.loads(path.read_text()))))
-    with pytest.raises(ValueError, match=rf"agent\.json.*{says}") as caught:
-        PpoPolicy.load(tmp_path)
-    assert type(caught.value) is ValueError and str(caught.value).startswith(str(path))

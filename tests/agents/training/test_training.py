@@ -11,7 +11,7 @@ from safetensors.torch import load_file
 
 import agents
 from agents.config.agent import AgentConfig
-from agents.policies.learned import PpoPolicy
+from agents.policies.learned import NetworkPolicy
 from agents.training.ppo import CHECKPOINT, Trainer
 from agents.training.sb3_vector import Sb3VecEnv, split_infos
 
@@ -50,7 +50,7 @@ CONFIG = AgentConfig(
 )
 
 
-def validate(policy: PpoPolicy) -> float:
+def validate(policy: NetworkPolicy) -> float:
     observation = np.random.default_rng(0).uniform(-1, 1, (256, 2)).astype(np.float32)
     return float(np.mean(policy.act(observation) == np.where(observation[:, 0] > 0, 2, 0)))
 

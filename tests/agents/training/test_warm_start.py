@@ -3,16 +3,26 @@
 import numpy as np
 import pytest
 import torch
+from gymnasium.spaces import Box, Discrete
+from stable_baselines3.common.policies import ActorCriticPolicy
 from test_training import CONFIG, FRAMES, NAMES, make_envs, validate
 
 from agents.evaluation.play import make_envs as make_shotenv, play_drives
 from agents.policies.fixed import FixedPolicy
-from agents.policies.learned import PpoPolicy, build_network
+from agents.policies.learned import NetworkPolicy, Provenance
 from agents.training.ppo import Trainer
 from agents.training.sb3_vector import Sb3VecEnv
 from agents.training.warmup import ROLLOUTS, KnownFrames, known_frames, warm_start
 from shotenv.config.keywords import env_config
 from shotenv.decision.features import SCENE_FEATURES
+
+TOLD = Provenance(algorithm="warm start", feature_names=NAMES)
+
+
+def untrained():
+    return ActorCriticPolicy(
+        Box(-np.inf, np.inf, (2,), np.float32), Discrete(3), lambda _: 1e-3, net_arch=[16]
+    )
 
 
 @pytest.fixture
@@ -26,15 +36,15 @@ def known():
 
 def test_the_actor_learns_the_cheapest_actions_and_the_critic_stays(known):
     torch.manual_seed(0)
-    network = build_network(2, CONFIG)
+    network = untrained()
     before = {name: value.clone() for name, value in network.state_dict().items()}
-    assert validate(PpoPolicy(network, CONFIG, NAMES)) < 0.8
+    assert validate(NetworkPolicy.from_ppo(network, TOLD)) < 0.8
     warm_start(network, known, seed=0)
-    assert validate(PpoPolicy(network, CONFIG, NAMES)) > 0.95
+    assert validate(NetworkPolicy.from_ppo(network, TOLD)) > 0.95
     after = network.state_dict()
     kept = {name for name in before if torch.equal(before[name], after[name])}
     assert kept == {name for name in before if "value" in name}
-    again = build_network(2, CONFIG)
+    again = untrained()
     again.load_state_dict(before)
     warm_start(again, known, seed=0)
     assert all(torch.equal(again.state_dict()[name], after[name]) for name in after)

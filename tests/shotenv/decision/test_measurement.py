@@ -10,7 +10,13 @@ import torch
 from shotenv.config.keywords import env_config
 from shotenv.decision.acquire import acquire_depth, acquire_depths, offset_to_subtract_lsb
 from shotenv.decision.features import SEEN_FEATURES
-from shotenv.decision.measurement import measure_by_shots, measure_frames, measure_prefixes
+from shotenv.decision.measurement import (
+    _measured_by_loop,
+    _measured_by_maps,
+    measure_by_shots,
+    measure_frames,
+    measure_prefixes,
+)
 from shotenv.decision.problem import open_problem
 from shotenv.decision.transition import reset, step
 from unwrap.signal.shots import Shots
@@ -113,3 +119,21 @@ def test_the_stored_offset_is_needed_with_two_samples_alone(problem):
         ]
         assert torch.equal(*maps) == (shots != Shots.TWO)
     assert offset_to_subtract_lsb(state.drive, Shots.TWO) is stored
+
+
+@pytest.mark.parametrize("eight", ["two_frequency", "network"])
+def test_the_loop_measures_as_the_chain_of_maps_to_the_last_bit(tiny_kwargs, eight):
+    """Each number of samples, and a laser that emits less than its own power in some drives."""
+    problem = open_problem(env_config(**{**tiny_kwargs, "eight": eight}))
+    state = reset(problem, [1, 2, 3, 4, 5, 6])
+    shots = torch.tensor([8, 0, 2, 4, 8, 2])
+    less = torch.tensor([1.0, 1.0, 1.0, 0.7, 0.5, 0.6], dtype=torch.float64)
+    for power_w in (state.drive.laser_power_w, less * state.drive.laser_power_w):
+        asked = problem, state.drive, state.step, shots, power_w
+        loop, maps = _measured_by_loop(*asked), _measured_by_maps(*asked)
+        for field in dataclasses.fields(loop.score):
+            assert torch.equal(getattr(loop.score, field.name), getattr(maps.score, field.name))
+        assert torch.equal(loop.error_of_four, maps.error_of_four)
+        for row, count in enumerate(shots.tolist()):
+            told = [count >= feature.least_shots for feature in SEEN_FEATURES]
+            assert torch.equal(loop.features[row, told], maps.features[row, told])

@@ -14,11 +14,11 @@ from shotenv.config.keywords import env_config
 from shotenv.config.reader import ConfigError
 from shotenv.decision.drive import chain_clips
 from shotenv.decision.features import FEATURE_NAMES, LIMIT, frame_means
-from shotenv.decision.observation import observe
 from shotenv.decision.outcomes import outcomes_of_all_actions
 from shotenv.decision.problem import open_problem
 from shotenv.decision.rewards import TERMS, reward, reward_terms
 from shotenv.decision.score import no_depth, score_depth
+from shotenv.decision.state import observe
 from shotenv.decision.transition import SHOTS_OF_ACTION, allowed_actions, reset, step
 from shotenv.laser.cost import ShotCost
 from unwrap.networks.predictor import load_unwrapper

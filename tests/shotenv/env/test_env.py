@@ -99,6 +99,8 @@ def test_wrong_actions_of_a_vector_are_named(tiny_kwargs, actions):
     [
         ({"colour": 1}, "colour"),
         ({"reward": {"power": -1}}, "reward: power is"),
+        ({"reward": {"power": [0.2, 0.01]}}, r"power is \(0.2, 0.01\); expected low <= high"),
+        ({"reward": {"energy": 1}}, r"unknown key reward\.energy; expected one of error, duty"),
         (
             {"reward": {"speed": 1}},
             r"unknown key reward\.speed; expected one of error, duty",

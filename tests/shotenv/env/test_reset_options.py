@@ -110,6 +110,8 @@ def test_what_is_set_of_the_sensor_shifts_nothing_else(tiny_kwargs):
             "ambient_k is 25.0; expected a number of K above 233.15 and below 3",
         ),
         ({"ambient_k": 350.0}, "ambient_k is 350.0"),
+        ({"power_price": -0.1}, "power_price is -0.1; expected a number of"),
+        ({"power_price": [0.01, 0.1]}, r"power_price is \[0.01, 0.1\]"),
     ],
 )
 def test_a_wrong_option_is_named(tiny_kwargs, options, words):

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from shotenv.decision.measurement import sum_pixels_
-from shotenv.decision.score import score_pixels_
+from shotenv.decision.score import score_pixels_, sum_pixels_
 from shotenv.sensor import pixel_loops
 from unwrap.support.compiled import array, loop
 
@@ -38,11 +37,12 @@ def pixel():
 def test_a_sample_is_that_of_the_python_loop_to_the_last_bit(light, pixel, draw):
     normals = draw((2, 2, ROWS, COLUMNS), -3.0, 3.0)
     pattern_lsb = draw((2, ROWS, COLUMNS), -20.0, 20.0)
+    parity = np.where(draw((ROWS, COLUMNS)) < 0.5, np.float32(-1), np.float32(1))
     found = []
     for take in (pixel_loops.take_sample_, pixel_loops.take_sample_.py_func):
         words = np.zeros((2, 2, ROWS, COLUMNS), np.float32)
         saturated = np.zeros((2, ROWS, COLUMNS), bool)
-        take(1, light, normals, pattern_lsb, pixel, words, saturated)
+        take(1, light, normals, pattern_lsb, parity, pixel, words, saturated)
         found.append((words, saturated))
     (words, saturated), (slow_words, slow_saturated) = found
     assert np.array_equal(words, slow_words) and np.array_equal(saturated, slow_saturated)

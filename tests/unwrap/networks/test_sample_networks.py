@@ -120,7 +120,10 @@ def test_with_eight_samples_it_decides_only_where_the_frequencies_disagree(probl
     )
     agree = alone.valid
     assert 0.3 < agree.float().mean() < 1
-    assert torch.equal(made.depth.distance_m[agree], alone.distance_m[agree])
+    # Without a prediction torch decodes, with one a compiled loop: equal but for rounding.
+    torch.testing.assert_close(
+        made.depth.distance_m[agree], alone.distance_m[agree], rtol=0, atol=1e-5
+    )
     first = decode_at(0, made.raw, problem.description, shift_m=drive.drift_m)
     guessed = ~agree & made.depth.valid
     assert guessed.any()

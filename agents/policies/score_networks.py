@@ -1,0 +1,129 @@
+"""Score networks: linear layers with one activation between, from features to a score per action.
+
+What stable-baselines3 and sb3-contrib train for three actions is such a network with other things
+around it. The functions here take it out, so that using it needs torch alone.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Final, Literal, cast
+
+import torch
+from torch import nn
+
+from unwrap.signal import Shots
+
+if TYPE_CHECKING:
+    from stable_baselines3.common.policies import ActorCriticPolicy
+    from stable_baselines3.dqn.policies import QNetwork
+
+Activation = Literal["tanh", "relu"]
+ACTIVATIONS: Final[dict[Activation, type[nn.Module]]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
+
+
+def score_network(layers: Sequence[int], activation: Activation) -> nn.Sequential:
+    """Untrained network of the widths `layers`: features, hidden layers, actions.
+
+    Examples
+    --------
+    >>> score_network((35, 64, 3), "relu")
+    Sequential(
+      (0): Linear(in_features=35, out_features=64, bias=True)
+      (1): ReLU()
+      (2): Linear(in_features=64, out_features=3, bias=True)
+    )
+    """
+    modules: list[nn.Module] = []
+    for inputs, outputs in pairwise(layers):
+        modules += [nn.Linear(inputs, outputs), ACTIVATIONS[activation]()]
+    return nn.Sequential(*modules[:-1])
+
+
+def linear_layers(network: nn.Sequential) -> list[nn.Linear]:
+    """The linear layers of a score network, in order."""
+    return [module for module in network if isinstance(module, nn.Linear)]
+
+
+def widths_of(network: nn.Sequential) -> tuple[int, ...]:
+    """Widths of its layers, features first, actions last."""
+    layers = linear_layers(network)
+    return (layers[0].in_features, *(layer.out_features for layer in layers))
+
+
+def activation_of(network: nn.Sequential) -> Activation:
+    """The activation between its layers.
+
+    Raises
+    ------
+    ValueError
+        It is not linear layers with biases and one activation, tanh or relu, between them.
+    """
+    modules = list(network)
+    between = {type(module) for module in modules[1::2]} or {nn.Tanh}
+    linear = all(isinstance(m, nn.Linear) and m.bias is not None for m in modules[::2])
+    for name, kind in ACTIVATIONS.items():
+        if linear and len(modules) % 2 and between == {kind}:
+            return name
+    got = ", ".join(type(module).__name__ for module in modules)
+    raise ValueError(
+        f"network is {got or 'empty'}; expected linear layers with biases and tanh or relu between"
+    )
+
+
+def actor_network(policy: ActorCriticPolicy) -> nn.Sequential:
+    """Logits of a stable-baselines3 actor (PPO, A2C): a copy of its own layers."""
+    _require_plain(policy.features_extractor)
+    return _copy_of(*policy.mlp_extractor.policy_net, policy.action_net)
+
+
+def q_network(network: QNetwork) -> nn.Sequential:
+    """Action values of stable-baselines3's DQN (`model.q_net`): a copy of its layers."""
+    _require_plain(network.features_extractor)
+    return _copy_of(*cast(nn.Sequential, network.q_net))
+
+
+def mean_quantile_network(network: Any) -> nn.Sequential:
+    """Mean over the quantiles of sb3-contrib's QR-DQN (`model.quantile_net`).
+
+    The mean of linear functions is linear: it is folded into the last layer, whose outputs are the
+    actions of the first quantile, then those of the second and so on.
+    """
+    _require_plain(network.features_extractor)
+    modules = list(_copy_of(*network.quantile_net))
+    last = cast(nn.Linear, modules[-1])
+    shape = network.n_quantiles, -1
+    # Without initial weights: they would take random numbers that a training run counts on.
+    mean = nn.utils.skip_init(nn.Linear, last.in_features, last.out_features // network.n_quantiles)
+    with torch.no_grad():
+        # In float64, rounded once.
+        weight = last.weight.double().reshape(*shape, last.in_features).mean(dim=0)
+        mean.weight.copy_(weight)
+        mean.bias.copy_(last.bias.double().reshape(shape).mean(dim=0))
+    return nn.Sequential(*modules[:-1], mean)
+
+
+def require_widths(network: nn.Sequential, feature_names: Sequence[str]) -> None:
+    """Raise ValueError unless `network` maps these features to a score per action."""
+    layers = widths_of(network)
+    if layers[0] != len(feature_names) or layers[-1] != len(Shots):
+        raise ValueError(
+            f"network maps {layers[0]} features to {layers[-1]} scores; "
+            f"expected {len(feature_names)} features and {len(Shots)} scores"
+        )
+
+
+def _copy_of(*modules: nn.Module) -> nn.Sequential:
+    return copy.deepcopy(nn.Sequential(*modules))
+
+
+def _require_plain(extractor: nn.Module) -> None:
+    """Refuse a network that does not read the features as they are."""
+    parameters: Iterable[nn.Parameter] = extractor.parameters()
+    if next(iter(parameters), None) is not None:
+        raise ValueError(
+            f"features_extractor is {type(extractor).__name__}, which has weights of its own; "
+            "expected a network of the features themselves"
+        )
