@@ -15,7 +15,7 @@ import numpy as np
 
 from agents.policies.looking import ENERGY_SHARES, REGRETS
 from agents.policies.policy import Action, Observation, Policy, single
-from agents.policies.readings import Readings, checked_at_least
+from agents.policies.readings import Readings, checked_at_least, checked_energy_shares
 
 CONTEXT: Final = (
     "gray_mean",
@@ -66,7 +66,7 @@ class LinearBanditPolicy(Policy):
         if not 0 < forget <= 1:
             raise ValueError(f"forget is {forget!r}; expected above 0 and at most 1")
         self.forget = forget
-        self._shares = np.asarray(energy_shares)
+        self._shares = checked_energy_shares(energy_shares)
         self._read = Readings(feature_names, "last_eight", "power_price", *CONTEXT)
         self._context: np.ndarray | None = None
 

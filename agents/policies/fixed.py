@@ -16,11 +16,12 @@ from agents.policies.policy import (
     same_action,
     single,
 )
+from agents.policies.readings import checked_frames
 from unwrap.signal import Shots
 
 
 class FixedPolicy(Policy):
-    """Always the same shots.
+    """Always the same shots, as cameras are set up today.
 
     Examples
     --------
@@ -54,6 +55,9 @@ class RandomPolicy(Policy):
 
 class MixturePolicy(Policy):
     """Each action with a probability of its own, whatever is observed.
+
+    What is best under a bound on mean energy may have to be mixed: Beutler and Ross, "Optimal
+    policies for controlled Markov chains with a constraint", J. Math. Anal. Appl. 112 (1985).
 
     Parameters
     ----------
@@ -93,6 +97,9 @@ class MixturePolicy(Policy):
 class CyclePolicy(Policy):
     """`shots` in every `period`-th frame, starting with the first, and `otherwise` between.
 
+    As the patent US 10,607,352 has key frames of several modulation frequencies, and between them
+    frames of one.
+
     Examples
     --------
     >>> print(CyclePolicy(4, shots=8, otherwise=2))
@@ -100,9 +107,7 @@ class CyclePolicy(Policy):
     """
 
     def __init__(self, period: int, shots: int = 8, otherwise: int = 2) -> None:
-        if period < 2:
-            raise ValueError(f"period is {period}; expected at least 2 frames")
-        self._period = period
+        self._period = checked_frames("period", period, 2)
         self._shots, self._otherwise = checked_shots(shots), checked_shots(otherwise)
         self.reset()
 
