@@ -96,6 +96,10 @@ class LinearBanditPolicy(Policy):
         """Forget all drives."""
         self._context = None
 
+    @property
+    def _parameters(self) -> str:
+        return f"width {self.width:g}, ridge {self.ridge:g}, forget {self.forget:g}"
+
     @abstractmethod
     def _judged(self, mean: np.ndarray, doubt: np.ndarray) -> np.ndarray:
         """Regrets [..., 2] to act on, of their means [..., 2] and the common doubt [...]."""
@@ -126,7 +130,7 @@ class LinUcbPolicy(LinearBanditPolicy):
 
     def __str__(self) -> str:
         """The rule in words."""
-        return f"LinUCB on measured regrets, width {self.width:g}, forget {self.forget:g}"
+        return f"LinUCB on measured regrets, {self._parameters}"
 
 
 class ThompsonPolicy(LinearBanditPolicy):
@@ -162,6 +166,4 @@ class ThompsonPolicy(LinearBanditPolicy):
 
     def __str__(self) -> str:
         """The rule in words."""
-        return (
-            f"Thompson sampling of measured regrets, width {self.width:g}, forget {self.forget:g}"
-        )
+        return f"Thompson sampling of measured regrets, {self._parameters}"

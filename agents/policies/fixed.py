@@ -36,6 +36,10 @@ class FixedPolicy(Policy):
         """The same action, whatever is observed."""
         return same_action(observation, self.action)
 
+    def __str__(self) -> str:
+        """The rule in words."""
+        return f"always {tuple(Shots)[self.action]:d} DCS"
+
 
 class RandomPolicy(Policy):
     """Each action with the same probability."""

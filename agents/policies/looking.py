@@ -224,10 +224,10 @@ class Looks:
 
     def __str__(self) -> str:
         """When to look, in words."""
-        since = ("it", "the frame after it")[self.reference_frame]
-        amplitude = f" or of {self.amplitude_change:g} in amplitude since {since}"
-        return (
-            f"8 DCS after a change of {self.change:g}"
-            f"{amplitude if np.isfinite(self.amplitude_change) else ''} and every "
-            f"{self.period} frames"
-        )
+        words = f"8 DCS every {self.period} frames"
+        if np.isfinite(self.change):
+            words += f", after a change of {self.change:g}"
+        if np.isfinite(self.amplitude_change):
+            since = ("the look", "the frame after it")[self.reference_frame]
+            words += f", and after one of {self.amplitude_change:g} in amplitude since {since}"
+        return words

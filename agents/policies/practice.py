@@ -131,33 +131,36 @@ the frame from which the amplitude is measured."""
 def look_and_hold(names: Names) -> Iterator[Policy]:
     """Looks after a change, then what was good enough."""
     limits = (0.02, 0.03, 0.05, 0.1, 0.2, 0.4)
-    for limit, period, change in product(limits, (12, 24, 96), CHANGES):
+    for limit, period, change in product(limits, (12, 24, 256), CHANGES):
         yield LookAndHoldPolicy(names, limit, period, *change)
 
 
 def look_and_weigh(names: Names) -> Iterator[Policy]:
     """Looks after a change, then what regret and price weigh least."""
-    for period, change, gain in product((12, 24, 96), CHANGES, (0.3, 0.45, 0.6, 0.9)):
+    for period, change, gain in product((12, 24, 256), CHANGES, (0.2, 0.3, 0.45, 0.6, 0.9)):
         yield LookAndWeighPolicy(names, period, *change, gain=gain)
 
 
 def look_and_weigh_heat(names: Names) -> Iterator[Policy]:
     """The same with a price on heat."""
-    prices = ((0.02, 2.0), (0.02, 8.0), (0.05, 2.0), (0.15, 0.5))
-    for period, change, gain, (heat, near_k) in product((24, 96), CHANGES, (0.45, 0.6), prices):
+    prices = ((0.02, 8.0), (0.05, 2.0), (0.15, 0.5))
+    for period, change, gain, (heat, near_k) in product((24, 256), CHANGES, (0.45, 0.6), prices):
         yield LookAndWeighPolicy(names, period, *change, gain=gain, heat_price=heat, near_k=near_k)
+
+
+WIDTHS, RIDGES, FORGETS = (0.0, 0.03, 0.1), (1.0, 3.0, 10.0), (0.6, 0.8, 0.95)
 
 
 def lin_ucb(names: Names) -> Iterator[Policy]:
     """Confidence bounds of regrets."""
-    for width, forget in product((0.02, 0.06, 0.2), (0.95, 1.0)):
-        yield LinUcbPolicy(names, width, ridge=0.1, forget=forget)
+    for width, ridge, forget in product(WIDTHS, RIDGES, FORGETS):
+        yield LinUcbPolicy(names, width, ridge, forget)
 
 
 def thompson(names: Names) -> Iterator[Policy]:
     """Draws of regrets."""
-    for width, forget in product((0.02, 0.06, 0.2), (0.95, 1.0)):
-        yield ThompsonPolicy(names, width, ridge=0.1, forget=forget)
+    for width, ridge, forget in product(WIDTHS, RIDGES, FORGETS):
+        yield ThompsonPolicy(names, width, ridge, forget)
 
 
 FAMILIES_OF_PRACTICE: Final = tuple(

@@ -102,10 +102,8 @@ class WakeOnChangePolicy(Policy):
 
     def __str__(self) -> str:
         """The rule in words."""
-        return (
-            f"8 DCS until the gray image changed by no more than {self.change:g} for "
-            f"{self.still_frames} frames, then {self.asleep:d}"
-        )
+        change = f" without a change of {self.change:g}" if np.isfinite(self.change) else ""
+        return f"8 DCS until {self.still_frames} frames{change}, then {self.asleep:d}"
 
 
 class MotionPolicy(Policy):
@@ -156,10 +154,10 @@ class MotionPolicy(Policy):
 
     def __str__(self) -> str:
         """The rule in words."""
-        return (
-            f"8 DCS once {self.way_m:g} m, {self.turn_rad:g} rad or a change of {self.change:g} "
-            f"lie behind the last, else {self.otherwise:d}"
-        )
+        limits = {"m": self.way_m, "rad": self.turn_rad, "of change": self.change}
+        listed = [f"{limit:g} {unit}" for unit, limit in limits.items() if np.isfinite(limit)]
+        once = f"once {' or '.join(listed)} lie behind the last" if listed else "in the first frame"
+        return f"8 DCS {once}, else {self.otherwise:d}"
 
 
 class UnsurePolicy(Policy):

@@ -125,7 +125,9 @@ def test_amplitude_is_compared_with_the_look_or_with_the_frame_after_it():
     from_look, from_next = (LookAndHoldPolicy(NAMES, 0.1, 16, 0.3, 0.2, frame) for frame in (0, 1))
     assert shots_of(from_look, *frames) == [2, 8, 8, 8]
     assert shots_of(from_next, *frames) == [2, 2, 2, 8]
-    assert str(from_next).startswith("8 DCS after a change of 0.3 or of 0.2 in amplitude since the")
+    assert "every 16 frames, after a change of 0.3, and after one of 0.2 in" in str(from_next)
+    assert "since the frame after it" in str(from_next) and "since the look" in str(from_look)
+    assert str(LookAndHoldPolicy(NAMES, 0.1, 16, np.inf)).startswith("8 DCS every 16 frames, then")
 
 
 def test_look_and_weigh_weighs_regret_against_the_observed_price():
