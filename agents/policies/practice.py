@@ -148,7 +148,7 @@ def look_and_weigh_heat(names: Names) -> Iterator[Policy]:
         yield LookAndWeighPolicy(names, period, *change, gain=gain, heat_price=heat, near_k=near_k)
 
 
-WIDTHS, RIDGES, FORGETS = (0.0, 0.03, 0.1), (1.0, 3.0, 10.0), (0.6, 0.8, 0.95)
+WIDTHS, RIDGES, FORGETS = (0.0, 0.03, 0.1, 0.3), (3.0, 10.0, 30.0), (0.4, 0.6, 0.8, 0.97)
 
 
 def lin_ucb(names: Names) -> Iterator[Policy]:
