@@ -109,7 +109,7 @@ def checked_frames(name: str, value: float, least: int) -> int:
     ValueError
         It is below `least`, or no whole number.
     """
-    if checked_at_least(name, value, least) != int(value):
+    if checked_at_least(name, value, least) % 1 != 0:
         raise ValueError(f"{name} is {value!r}; expected a whole number of frames")
     return int(value)
 
