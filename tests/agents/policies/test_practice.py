@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from agents.policies.bandits import LinUcbPolicy, ThompsonPolicy
-from agents.policies.fixed import CyclePolicy, MixturePolicy
+from agents.policies.fixed import CyclePolicy, FixedPolicy, MixturePolicy
 from agents.policies.looking import LookAndHoldPolicy, LookAndWeighPolicy, PersistencePolicy
 from agents.policies.practice import FAMILIES_OF_PRACTICE
 from agents.policies.readings import Readings
@@ -220,3 +220,20 @@ def test_candidates_are_few_and_all_act(family):
     # Words tell candidates apart, as reports need.
     if type(candidates[0]).__str__ is not object.__str__:
         assert len({str(policy) for policy in candidates}) == len(candidates)
+
+
+@pytest.mark.parametrize(
+    ("policy", "words"),
+    [
+        (
+            MotionPolicy(NAMES, 3, np.inf, 0.1),
+            "8 DCS once 3 m or 0.1 of change lie behind",
+        ),
+        (MotionPolicy(NAMES, np.inf, np.inf, np.inf, 4), "8 DCS in the first frame, else 4"),
+        (WakeOnChangePolicy(NAMES, 0.1, 4), "8 DCS until 4 frames without a change of 0.1, then 2"),
+        (WakeOnChangePolicy(NAMES, np.inf, 4), "8 DCS until 4 frames, then 2"),
+        (FixedPolicy(4), "always 4 DCS"),
+    ],
+)
+def test_limits_that_nothing_exceeds_are_not_told(policy, words):
+    assert str(policy).startswith(words)
