@@ -76,7 +76,7 @@ class QLearner:
         if self._quantiles:
             form["n_quantiles"] = learner.quantiles
         algorithm: Any = quantile_learner() if self._quantiles else DQN
-        self._model = algorithm(
+        self.model = algorithm(
             "MlpPolicy",
             envs,
             learning_rate=learner.learning_rate,
@@ -106,8 +106,8 @@ class QLearner:
     def policy(self) -> NetworkPolicy:
         """The network as it is now."""
         if self._quantiles:
-            return NetworkPolicy.from_qr_dqn(self._model.quantile_net, self._provenance)
-        return NetworkPolicy.from_dqn(self._model.q_net, self._provenance)
+            return NetworkPolicy.from_qr_dqn(self.model.quantile_net, self._provenance)
+        return NetworkPolicy.from_dqn(self.model.q_net, self._provenance)
 
     def run(self) -> NetworkPolicy:
         """Train from the start to the end; returns the best policy.
@@ -121,14 +121,13 @@ class QLearner:
         with progress(learner.total_steps, "training", "step") as bar:
             judge = _Judge(bar, self, math.ceil(learner.total_steps / learner.validations))
             try:
-                self._model.learn(learner.total_steps, callback=judge)
+                self.model.learn(learner.total_steps, callback=judge)
             except KeyboardInterrupt:
                 kept = f"the best scheduler so far is in {self._out}, " if judge.any else ""
                 raise KeyboardInterrupt(
                     f"{kept}the memory of {self._config.algorithm} is not kept: "
                     "the same command starts over"
                 ) from None
-            judge.judge()
         # From disk: the best policy, which need not be the last one.
         return NetworkPolicy.load(self._out)
 
@@ -152,14 +151,17 @@ class _Judge(BaseCallback):
         """Whether a policy has been kept."""
         return math.isfinite(self._state.best_return)
 
-    def judge(self) -> None:
-        """Judge the policy as it is."""
-        self._state = self._learner.judged(self._state, self.num_timesteps)
-        self._bar.set_postfix_str(self._state.in_words(), refresh=False)
-
     def _on_step(self) -> bool:
         self._bar.update(self.training_env.num_envs)
         if self.num_timesteps >= self._next:
             self._next += self._interval
-            self.judge()
+            self._judge()
         return True
+
+    def _on_training_end(self) -> None:
+        # The last steps may not have filled an interval.
+        self._judge()
+
+    def _judge(self) -> None:
+        self._state = self._learner.judged(self._state, self.num_timesteps)
+        self._bar.set_postfix_str(self._state.in_words(), refresh=False)
