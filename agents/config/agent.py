@@ -70,7 +70,7 @@ class RegressionConfig(Section):
     learning_rate: Positive = Field(3e-3, description="AdamW learning rate at the start")
     weight_decay: NonNegative = Field(0.03, description="of AdamW")
     noise: NonNegative = Field(
-        0.3, description="noise on each feature in training, in its standard deviations"
+        0.3, description="noise on features of the scene in training, in their standard deviations"
     )
 
 

@@ -1,6 +1,6 @@
 """Networks fitted to what each action is worth: several of them, averaged into one.
 
-The data are few clips, which networks learn by heart within a few passes. So each sees its features
+The data are few clips, which networks learn by heart within a few passes. So each sees the frame
 with noise, is judged after every pass on frames of other clips, and is kept as it was then at its
 best; and scores are the mean over several networks.
 """
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import torch
@@ -16,6 +17,11 @@ from torch import Tensor, nn
 
 from agents.config import AgentConfig
 from agents.policies import mean_network, rescaled_network, score_network
+from shotenv.decision import SCENE_FEATURES, SEEN_FEATURES
+
+SHOWN: Final = len(SCENE_FEATURES) + len(SEEN_FEATURES)
+"""Features at the front of the observation that tell the scene, by which a clip is known again; the
+others tell the state of the drive, such as the price, and are given as they are."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +103,11 @@ def _member(
     best, least = network.state_dict(), np.inf
     for _ in range(learner.passes):
         for rows in torch.randperm(len(shown), generator=generator).split(learner.batch_size):
-            noise = torch.randn(len(rows), shown.shape[1], generator=generator)
-            scores = network(shown[rows] + learner.noise * noise)
+            noisy = shown[rows]
+            noisy[:, :SHOWN] += learner.noise * torch.randn(
+                noisy[:, :SHOWN].shape, generator=generator
+            )
+            scores = network(noisy)
             loss = nn.functional.mse_loss(scores, target[rows])
             optimizer.zero_grad()
             loss.backward()

@@ -57,6 +57,16 @@ def test_ctrl_c_says_what_the_same_command_will_do(capsys, monkeypatch, command)
     assert (status, out, err) == (130, "", f"shotenv: interrupted; the same command {says}\n")
 
 
+def test_what_was_interrupted_may_say_itself_what_is_kept(capsys, monkeypatch):
+    def interrupted(arguments):
+        raise KeyboardInterrupt("its memory is not kept")
+
+    train = next(command for command in COMMANDS if command.words == "train")
+    changed = tuple(replace(c, action=interrupted) if c is train else c for c in COMMANDS)
+    monkeypatch.setattr("agents.cli.entry.COMMANDS", changed)
+    assert run(capsys, "train") == (130, "", "shotenv: interrupted; its memory is not kept\n")
+
+
 def test_ctrl_c_before_a_command_has_begun_promises_nothing(capsys, monkeypatch):
     def interrupted(words):
         raise KeyboardInterrupt
