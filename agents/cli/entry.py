@@ -82,9 +82,11 @@ def _run(words: list[str]) -> int:
             arguments = _parsed(command, words[len(own) :])
             try:
                 return command.action(arguments)
-            except KeyboardInterrupt:
+            except KeyboardInterrupt as stop:
                 next_time = "continues where it stopped" if command.resumes else "starts over"
-                return _refuse(f"interrupted; the same command {next_time}", INTERRUPTED)
+                # What was interrupted may know better what is kept.
+                told = str(stop) or f"the same command {next_time}"
+                return _refuse(f"interrupted; {told}", INTERRUPTED)
     return _overview(words)
 
 

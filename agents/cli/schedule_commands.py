@@ -36,7 +36,7 @@ def run_demo(arguments: Namespace) -> int:
     say(f"1/4  Bank '{config.env.bank}' and the network's predictions for it")
     prepare_bank(config.env)
     play_on_one_thread()
-    say(f"2/4  PPO scheduler, {config.agent.total_steps} steps")
+    say(f"2/4  Scheduler, by {config.agent.algorithm}")
     scheduler = train_scheduler(config, arguments.out / "agent")
     say("3/4  Baselines and test drives")
     evaluation = evaluate_scheduler(config, scheduler)
@@ -116,7 +116,7 @@ COMMANDS = (
     ),
     Command(
         "train",
-        "train a scheduler with PPO; continues where it stopped",
+        "train a scheduler with PPO, DQN, QR-DQN or a regression",
         train_arguments,
         train,
         resumes=True,

@@ -1,3 +1,8 @@
-from .agent import AgentConfig as AgentConfig
+from .agent import (
+    AgentConfig as AgentConfig,
+    DqnConfig as DqnConfig,
+    PpoConfig as PpoConfig,
+    RegressionConfig as RegressionConfig,
+)
 from .demo import DemoConfig as DemoConfig
 from .study_config import StudyConfig as StudyConfig

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+import math
+from typing import Literal
 
-from unwrap.support import Fraction, NonNegative, Positive, Section
+from pydantic import Field, field_validator
+
+from unwrap.support import Fraction, NonNegative, Positive, Range, Section, check_range
+
+Algorithm = Literal["ppo", "dqn", "qrdqn", "regression"]
 
 
-class AgentConfig(Section):
-    """Training of a scheduler with PPO."""
+class PpoConfig(Section):
+    """Proximal policy optimisation, by stable-baselines3."""
 
-    total_steps: int = Field(100_000, ge=1, description="environment steps in all")
+    total_steps: int = Field(65_536, ge=1, description="environment steps in all")
     num_envs: int = Field(16, ge=1, description="environments in the batch")
-    drives: int = Field(32, ge=1, description="different drives to train on, again and again")
+    drives: int = Field(24, ge=1, description="different drives to train on, again and again")
     rollout_steps: int = Field(128, ge=2, description="steps of each environment per update")
     batch_size: int = Field(512, ge=2, description="steps per gradient batch")
     epochs: int = Field(10, ge=1, description="passes over a rollout")
@@ -20,8 +25,90 @@ class AgentConfig(Section):
     gamma: Fraction = Field(0.98, description="discount per frame")
     gae_lambda: Fraction = Field(0.95, description="lambda of the advantage estimate")
     entropy_coefficient: NonNegative = Field(0.005, description="weight of the policy's entropy")
-    hidden: tuple[int, ...] = Field((64, 64), description="hidden layers of policy and value")
     warm_start: bool = Field(
         True, description="whether to start from the known costs of all actions in the drives"
     )
+
+
+class DqnConfig(Section):
+    """Deep Q-learning by stable-baselines3, or with quantiles (QR-DQN) by sb3-contrib."""
+
+    total_steps: int = Field(200_000, ge=1, description="environment steps in all")
+    num_envs: int = Field(8, ge=1, description="environments in the batch")
+    buffer_size: int = Field(200_000, ge=1, description="steps that are remembered")
+    learning_starts: int = Field(2_000, ge=0, description="steps before the first update")
+    gradient_steps: int = Field(2, ge=1, description="updates per step of all environments")
+    batch_size: int = Field(128, ge=2, description="steps per update")
+    learning_rate: Positive = Field(3e-4, description="Adam learning rate")
+    gamma: Fraction = Field(0.95, description="discount per frame")
+    target_update: int = Field(4_000, ge=1, description="steps between updates of the target")
+    exploration: Fraction = Field(0.2, description="share of the run until epsilon is at its end")
+    epsilon: Fraction = Field(0.05, description="share of random actions from then on")
+    quantiles: int = Field(32, ge=2, description="quantiles of each value, QR-DQN alone")
+    validations: int = Field(20, ge=1, description="times that the policy is judged, evenly spread")
+
+
+class RegressionConfig(Section):
+    """Regression of every action's worth on the observation, from counterfactual outcomes."""
+
+    rounds: int = Field(4, ge=1, description="rounds of playing, looking ahead and fitting")
+    drives: int = Field(96, ge=1, description="different training drives")
+    validation_drives: int = Field(
+        24, ge=1, description="validation drives that stop the fit and choose the round"
+    )
+    horizon: int = Field(
+        12, ge=1, description="frames that each action is followed for; 1: its own frame alone"
+    )
+    gamma: Fraction = Field(0.9, description="discount per frame of those that follow")
+    stride: int = Field(2, ge=1, description="every how manieth frame of a drive is looked at")
+    epsilon: Fraction = Field(
+        0.5, description="share of random actions in the drive that has most; others have fewer"
+    )
+    members: int = Field(5, ge=1, description="networks whose scores are averaged")
+    passes: int = Field(12, ge=1, description="most passes over the frames; the best is kept")
+    batch_size: int = Field(512, ge=2, description="frames per gradient batch")
+    learning_rate: Positive = Field(3e-3, description="AdamW learning rate at the start")
+    weight_decay: NonNegative = Field(0.03, description="of AdamW")
+    noise: NonNegative = Field(
+        0.3, description="noise on features of the scene in training, in their standard deviations"
+    )
+
+
+class AgentConfig(Section):
+    """Training of a scheduler.
+
+    Attributes
+    ----------
+    ppo, dqn, regression
+        Of each learner; that of the `algorithm` counts. DQN and QR-DQN share one.
+    """
+
+    algorithm: Algorithm = Field("ppo", description="which learner")
+    hidden: tuple[int, ...] = Field((64, 64), description="hidden layers of each network")
+    power_price: Range | None = Field(
+        (0.01, 0.35),
+        description="range of the price of power that drives are trained with, drawn "
+        "log-uniformly for each; none: that of the environment",
+    )
     seed: int = Field(0, ge=0, description="seed of weights and drives")
+    tensorboard: bool = Field(False, description="whether to log for TensorBoard in the folder")
+    ppo: PpoConfig = PpoConfig()
+    dqn: DqnConfig = DqnConfig()
+    regression: RegressionConfig = RegressionConfig()
+
+    @field_validator("power_price")
+    @classmethod
+    def _price_possible(cls, power_price: Range | None) -> Range | None:
+        if power_price is None:
+            return None
+        low, high = power_price
+        check_range("power_price", power_price)
+        if low <= 0 or not math.isfinite(high):
+            raise ValueError(f"power_price is ({low:g}, {high:g}); expected finite prices above 0")
+        return power_price
+
+    def told(self) -> dict[str, object]:
+        """What the run depends on, as JSON has it: of the learners that of the `algorithm`."""
+        section = "dqn" if self.algorithm == "qrdqn" else self.algorithm
+        others = {"ppo", "dqn", "regression", "tensorboard"} - {section}
+        return self.model_dump(mode="json", exclude=others)

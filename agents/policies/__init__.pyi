@@ -27,7 +27,13 @@ from .rules import (
     SnrTwoThresholdPolicy as SnrTwoThresholdPolicy,
     rule_in_words as rule_in_words,
 )
-from .score_networks import linear_layers as linear_layers, widths_of as widths_of
+from .score_networks import (
+    linear_layers as linear_layers,
+    mean_network as mean_network,
+    rescaled_network as rescaled_network,
+    score_network as score_network,
+    widths_of as widths_of,
+)
 from .watching import (
     DistanceHysteresisPolicy as DistanceHysteresisPolicy,
     MotionPolicy as MotionPolicy,

@@ -56,7 +56,7 @@ class Provenance(Section):
     Attributes
     ----------
     algorithm : str
-        As "ppo", "dqn", "qr-dqn", "regression".
+        As "ppo", "dqn", "qrdqn", "regression".
     feature_names : tuple of str
         Elements of the observation, in order.
     power_price : (float, float), optional

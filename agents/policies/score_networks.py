@@ -95,14 +95,61 @@ def mean_quantile_network(network: Any) -> nn.Sequential:
     modules = list(_copy_of(*network.quantile_net))
     last = cast(nn.Linear, modules[-1])
     shape = network.n_quantiles, -1
-    # Without initial weights: they would take random numbers that a training run counts on.
-    mean = nn.utils.skip_init(nn.Linear, last.in_features, last.out_features // network.n_quantiles)
-    with torch.no_grad():
-        # In float64, rounded once.
-        weight = last.weight.double().reshape(*shape, last.in_features).mean(dim=0)
-        mean.weight.copy_(weight)
-        mean.bias.copy_(last.bias.double().reshape(shape).mean(dim=0))
+    # In float64, rounded once.
+    weight = last.weight.double().reshape(*shape, last.in_features).mean(dim=0)
+    mean = _linear(weight, last.bias.double().reshape(shape).mean(dim=0))
     return nn.Sequential(*modules[:-1], mean)
+
+
+def mean_network(networks: Sequence[nn.Sequential]) -> nn.Sequential:
+    """One network whose scores are the mean of those of `networks`, which are formed alike.
+
+    Their hidden layers stand side by side, each reads its own alone, and the last takes the mean.
+
+    Examples
+    --------
+    >>> members = [score_network((2, 4, 3), "tanh") for _ in range(5)]
+    >>> widths_of(mean_network(members))
+    (2, 20, 3)
+    """
+    depth, count = len(linear_layers(networks[0])), len(networks)
+    merged = []
+    for place, layers in enumerate(zip(*(linear_layers(one) for one in networks), strict=True)):
+        weights, biases = ([getattr(one, part) for one in layers] for part in ("weight", "bias"))
+        # All read the same features, and are summed into the same scores; between, blocks.
+        weight = torch.cat(weights, 0) if place == 0 else torch.block_diag(*weights)
+        bias = torch.cat(biases)
+        if place == depth - 1:
+            weight = torch.cat(weights, 1) / count if place else torch.stack(weights).mean(0)
+            bias = torch.stack(biases).mean(0)
+        merged.append(_linear(weight, bias))
+    # As the first has it: linear layers in even places, the activation between.
+    activations = list(networks[0])[1::2]
+    pairs = zip(merged, [*activations, None], strict=True)
+    return _copy_of(*(module for pair in pairs for module in pair if module is not None))
+
+
+def rescaled_network(
+    network: nn.Sequential, mean: torch.Tensor, spread: torch.Tensor, scale: float
+) -> nn.Sequential:
+    """`scale` times `network` of features (x - `mean`) / `spread`, as a network of x."""
+    whole = _copy_of(*network)
+    first, last = linear_layers(whole)[0], linear_layers(whole)[-1]
+    with torch.no_grad():
+        first.weight.div_(spread)
+        first.bias.sub_(first.weight @ mean)
+        last.weight.mul_(scale)
+        last.bias.mul_(scale)
+    return whole
+
+
+def _linear(weight: torch.Tensor, bias: torch.Tensor) -> nn.Linear:
+    # Without initial weights: they would take random numbers that a training run counts on.
+    layer = nn.utils.skip_init(nn.Linear, weight.shape[1], weight.shape[0])
+    with torch.no_grad():
+        layer.weight.copy_(weight)
+        layer.bias.copy_(bias)
+    return layer
 
 
 def require_widths(network: nn.Sequential, feature_names: Sequence[str]) -> None:

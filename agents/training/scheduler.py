@@ -1,55 +1,111 @@
-"""A scheduler trained as a configuration says: environments, validation and warm start for PPO."""
+"""A scheduler trained as a configuration says: environments, validation and warm start."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from agents.config import DemoConfig
-from agents.evaluation import drive_seeds, make_envs, play_drives
+from agents.evaluation import drive_seeds, make_envs
 from agents.policies import NetworkPolicy
-from agents.training.ppo import Trainer, training_drives
+from agents.training.branching import Branches
+from agents.training.checkpoint import Validate, training_drives
+from agents.training.ppo import PpoTrainer
+from agents.training.q_learning import QLearner
+from agents.training.regression import RegressionTrainer
 from agents.training.sb3_vector import Sb3VecEnv
 from agents.training.warmup import ROLLOUTS, known_frames, warm_start
-from shotenv.decision import FEATURE_NAMES
-from unwrap.support import progress
+from shotenv.config import EnvConfig
+from shotenv.decision import FEATURE_NAMES, open_problem
+from unwrap.support import Range, progress
 
 if TYPE_CHECKING:
     from stable_baselines3.common.policies import ActorCriticPolicy
 
-VALIDATION_DRIVES: Final = 6
-"""Most drives that choose the best round (assumed): they are played again after each."""
+VALIDATION_PRICES: Final = 4
+"""Prices of power at which validation drives are played (assumed)."""
 
 
 def train_scheduler(config: DemoConfig, out: Path) -> NetworkPolicy:
-    """Train PPO on training drives, from its checkpoint in `out` where there is one.
+    """Train on training drives, where the learner can from its checkpoint in `out`.
 
-    The policy with the best return on validation drives is kept.
+    The policy with the best return on validation drives, over all prices, is kept.
+
+    Raises
+    ------
+    ValueError
+        `out` holds the checkpoint of another configuration, or a damaged one.
+    ImportError
+        The learner, or TensorBoard, needs a package that is not installed.
     """
-    envs = make_envs(config.env, "train", config.agent.num_envs, "SameStep")
-    seeds = drive_seeds(config.study, min(VALIDATION_DRIVES, config.study.tuning_drives))
+    env, agent = priced(config.env, config.agent.power_price), config.agent
+    regression = agent.algorithm == "regression"
+    count = agent.regression.validation_drives if regression else config.study.tuning_drives
     # Other clips than those of training, and than those of the test that the report tells of.
-    judges = make_envs(config.env, "validation", len(seeds), "Disabled")
+    judging = branches_of(env, "validation", drive_seeds(config.study, count))
+    prices = validation_prices(env.reward.power)
 
     def validate(policy: NetworkPolicy) -> float:
-        return float(play_drives(policy, judges, seeds).reward.sum(axis=1).mean())
+        return judging.mean_return(policy, prices)
+
+    if regression:
+        seeds = training_drives(agent.seed, agent.regression.drives).tolist()
+        training = branches_of(env, "train", seeds)
+        return RegressionTrainer(training, judging, env.reward.power, agent, validate, out).run()
+    if agent.algorithm == "ppo":
+        return ppo_trainer(env, config, validate, out).run()
+    envs = Sb3VecEnv(make_envs(env, "train", agent.dqn.num_envs, "SameStep"))
+    return QLearner(envs, FEATURE_NAMES, agent, validate, out, env.reward.power).run()
+
+
+def ppo_trainer(env: EnvConfig, config: DemoConfig, validate: Validate, out: Path) -> PpoTrainer:
+    """PPO on drives of `env`, with its warm start."""
+    agent = config.agent
+    envs = Sb3VecEnv(make_envs(env, "train", agent.ppo.num_envs, "SameStep"))
 
     def warm(network: ActorCriticPolicy) -> None:
         """Play every action in every frame of the training drives, and learn from that."""
-        known = training_drives(config.agent).tolist()
-        players = make_envs(config.env, "train", len(known), "Disabled")
-        frames = (1 + ROLLOUTS) * len(known) * config.env.frames_per_drive
+        known = training_drives(agent.seed, agent.ppo.drives).tolist()
+        players = make_envs(env, "train", len(known), "Disabled")
+        frames = (1 + ROLLOUTS) * len(known) * env.frames_per_drive
         with progress(frames, "every action in the training drives", "frame") as bar:
             cases = known_frames(players, known, tick=bar.update)
-        warm_start(network, cases, seed=config.agent.seed)
+        warm_start(network, cases, seed=agent.seed)
 
-    return Trainer(
-        Sb3VecEnv(envs),
+    return PpoTrainer(
+        envs,
         FEATURE_NAMES,
-        config.env.frames_per_drive,
-        config.agent,
+        env.frames_per_drive,
+        agent,
         validate,
         out,
-        warm if config.agent.warm_start else None,
-        config.env.reward.power,
-    ).run()
+        warm if agent.ppo.warm_start else None,
+        env.reward.power,
+    )
+
+
+def branches_of(env: EnvConfig, split: str, seeds: list[int]) -> Branches:
+    """Drives of a split, measured under a progress bar."""
+    problem = open_problem(env.model_copy(update={"split": split}))
+    frames = len(seeds) * env.frames_per_drive
+    with progress(frames, f"every action in the {split} drives", "frame") as bar:
+        return Branches(problem, seeds, tick=bar.update)
+
+
+def priced(env: EnvConfig, power_price: Range | None) -> EnvConfig:
+    """`env` with this range of prices of power; of None, as it is."""
+    if power_price is None:
+        return env
+    reward = env.reward.model_copy(update={"power": power_price})
+    return env.model_copy(update={"reward": reward})
+
+
+def validation_prices(power_price: Range) -> list[float]:
+    """Prices that stand for equally likely parts of the range."""
+    low, high = power_price
+    if low == high:
+        return [low]
+    middles = (np.arange(VALIDATION_PRICES) + 0.5) / VALIDATION_PRICES
+    return (low * (high / low) ** middles).tolist()

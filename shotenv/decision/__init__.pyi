@@ -14,7 +14,11 @@ from .features import (
     feature_index as feature_index,
     heat_margin_k as heat_margin_k,
 )
-from .measurement import Measure as Measure, measure_frames as measure_frames
+from .measurement import (
+    Measure as Measure,
+    Measurement as Measurement,
+    measure_frames as measure_frames,
+)
 from .measurement_cache import MeasurementCache as MeasurementCache
 from .outcomes import Outcomes as Outcomes, outcomes_of_all_actions as outcomes_of_all_actions
 from .problem import Problem as Problem, open_problem as open_problem
@@ -24,6 +28,7 @@ from .scenes import (
     look_at_scenes as look_at_scenes,
     probe_features as probe_features,
 )
+from .score import no_depth as no_depth
 from .state import State as State, observe as observe
 from .transition import (
     Outcome as Outcome,

@@ -112,6 +112,7 @@ ONLY_IN = {
     "drjit": "shotenv/render/",
     "trimesh": ("shotenv/world/", "shotenv/scenes/", "unwrap/recordings/"),
     "stable_baselines3": "agents/",
+    "sb3_contrib": "agents/training/",
     "lightning": "unwrap/training/",
     "numba": "unwrap/support/compiled.py",
     "plotly": "agents/report/",

@@ -9,10 +9,9 @@ from safetensors.torch import load_file
 
 from agents.cli.doctor import Finding
 from agents.cli.entry import COMMANDS, main
-from agents.evaluation.play import play_drives
-from agents.policies.learned import NetworkPolicy
 from agents.report.results import FRAMES, RESULTS, TIMELINE, write_strip
-from agents.training.ppo import CHECKPOINT
+from agents.training.branching import Branches
+from agents.training.checkpoint import CHECKPOINT
 from shotenv.config.families import FAMILIES
 from unwrap.support.files import write_json
 
@@ -58,6 +57,16 @@ def test_ctrl_c_says_what_the_same_command_will_do(capsys, monkeypatch, command)
     assert (status, out, err) == (130, "", f"shotenv: interrupted; the same command {says}\n")
 
 
+def test_what_was_interrupted_may_say_itself_what_is_kept(capsys, monkeypatch):
+    def interrupted(arguments):
+        raise KeyboardInterrupt("its memory is not kept")
+
+    train = next(command for command in COMMANDS if command.words == "train")
+    changed = tuple(replace(c, action=interrupted) if c is train else c for c in COMMANDS)
+    monkeypatch.setattr("agents.cli.entry.COMMANDS", changed)
+    assert run(capsys, "train") == (130, "", "shotenv: interrupted; its memory is not kept\n")
+
+
 def test_ctrl_c_before_a_command_has_begun_promises_nothing(capsys, monkeypatch):
     def interrupted(words):
         raise KeyboardInterrupt
@@ -67,22 +76,19 @@ def test_ctrl_c_before_a_command_has_begun_promises_nothing(capsys, monkeypatch)
 
 
 def test_an_interrupted_training_of_the_command_line_goes_on(capsys, monkeypatch, tmp_path, tiny):
-    small = "--agent.total_steps 96 --agent.num_envs 2 --agent.rollout_steps 16"
-    small += " --agent.batch_size 16 --env.frames_per_drive 16 --study.tuning_drives 2"
+    small = "--agent.ppo.total_steps 96 --agent.ppo.num_envs 2 --agent.ppo.rollout_steps 16"
+    small += " --agent.ppo.batch_size 16 --env.frames_per_drive 16 --study.tuning_drives 2"
     words = ("train", *small.split(), *tiny)
-    played, judged = play_drives, []
+    judge, judged = Branches.mean_return, []
 
-    def interrupting(policy, *rest, **options):
+    def interrupting(drives, policy, prices):
         judged.append(policy)
-        if (
-            isinstance(policy, NetworkPolicy)
-            and sum(isinstance(p, NetworkPolicy) for p in judged) == 3
-        ):
+        if len(judged) == 3:
             raise KeyboardInterrupt
-        return played(policy, *rest, **options)
+        return judge(drives, policy, prices)
 
     with monkeypatch.context() as patched:
-        patched.setattr("agents.training.scheduler.play_drives", interrupting)
+        patched.setattr(Branches, "mean_return", interrupting)
         status, _, err = run(capsys, *words, "--out", tmp_path / "parts")
     assert status == 130 and err.endswith("continues where it stopped\n")
     for name in ("parts", "whole"):
@@ -101,8 +107,8 @@ def test_a_group_lists_its_commands(capsys):
     ("words", "says"),
     [
         (("fly",), "'fly'; expected one of doctor"),
-        (("demo", "--agent.gamm", "1"), "agent.gamm"),
-        (("demo", "--agent.gamma", "3"), "agent.gamma"),
+        (("demo", "--agent.ppo.gamm", "1"), "agent.ppo.gamm"),
+        (("demo", "--agent.ppo.gamma", "3"), "agent.ppo.gamma"),
         (("demo", "--env.sensor.f1_hz", "24 MHz"), "f1_hz"),
         (("demo", "--env.sensor.f2_hz", "30e6"), "f2_hz"),
         (("demo", "--config", "/no/such.yaml"), "such.yaml"),
@@ -117,7 +123,7 @@ def test_wrong_usage_is_one_sentence_and_status_2(capsys, words, says):
 
 def test_an_unknown_key_in_a_file_is_named(capsys, tmp_path):
     path = tmp_path / "mine.yaml"
-    path.write_text("agent: {gamma: 0.9, lambda: 1}\n")
+    path.write_text("agent: {ppo: {gamma: 0.9, lambda: 1}}\n")
     status, _, err = run(capsys, "demo", "--config", path)
     assert status == 2 and "lambda" in err and err.count("\n") == 1
 
@@ -171,9 +177,8 @@ def test_report_is_written_anew(capsys, tmp_path):
 
 def test_demo_does_the_main_job(capsys, tmp_path, tiny):
     out = tmp_path / "demo"
-    small = (
-        "--agent.total_steps 64 --agent.num_envs 2 --agent.rollout_steps 16 --agent.batch_size 16"
-    )
+    small = "--agent.ppo.total_steps 64 --agent.ppo.num_envs 2 --agent.ppo.rollout_steps 16"
+    small += " --agent.ppo.batch_size 16"
     small += " --env.frames_per_drive 16 --study.drives 2 --study.tuning_drives 2"
     small += " --study.bootstrap_draws 100"
     words = ("demo", "--out", out, "--json", tmp_path / "n.json", *small.split(), *tiny)

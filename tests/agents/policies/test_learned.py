@@ -14,7 +14,7 @@ from stable_baselines3.common.torch_layers import FlattenExtractor
 from torch import nn
 
 from agents.policies.learned import NetworkPolicy, Provenance, load_policy
-from agents.policies.score_networks import score_network
+from agents.policies.score_networks import mean_network, rescaled_network, score_network, widths_of
 
 NAMES = ("gray_mean", "signal_to_noise", "time_left")
 TOLD = Provenance(
@@ -95,6 +95,34 @@ def test_quantiles_are_folded_into_their_mean():
     assert torch.equal(drawn, torch.random.get_rng_state()), "takes a training run's numbers"
     expected = network(torch.from_numpy(OBSERVED)).mean(dim=1).detach().numpy()
     np.testing.assert_allclose(policy.scores(OBSERVED), expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("activation", ["tanh", "relu"])
+@pytest.mark.parametrize("layers", [(3, 3), (3, 8, 3), (3, 7, 5, 3)])
+def test_a_mean_network_scores_the_mean_of_its_members(layers, activation):
+    torch.manual_seed(1)
+    members = [score_network(layers, activation) for _ in range(4)]
+    drawn = torch.random.get_rng_state()
+    whole = mean_network(members)
+    assert torch.equal(drawn, torch.random.get_rng_state()), "takes a training run's numbers"
+    assert widths_of(whole) == (3, *(4 * width for width in layers[1:-1]), 3)
+    seen = torch.from_numpy(OBSERVED)
+    expected = torch.stack([member(seen) for member in members]).mean(dim=0)
+    torch.testing.assert_close(whole(seen), expected)
+    assert NetworkPolicy(whole, TOLD).activation in (activation, "tanh")
+
+
+@pytest.mark.parametrize("layers", [(3, 3), (3, 8, 3)])
+def test_a_rescaled_network_reads_features_as_they_are(layers):
+    torch.manual_seed(1)
+    network, seen = score_network(layers, "relu"), torch.from_numpy(OBSERVED)
+    mean, spread = torch.tensor([0.5, -1.0, 0.0]), torch.tensor([2.0, 0.1, 1.0])
+    before = network(seen)
+    whole = rescaled_network(network, mean, spread, 7.0)
+    torch.testing.assert_close(
+        whole(seen), 7.0 * network((seen - mean) / spread), atol=1e-4, rtol=1e-4
+    )
+    assert torch.equal(network(seen), before), "changes what it was given"
 
 
 def test_the_network_is_a_copy():

@@ -1,4 +1,5 @@
 import ast
+import math
 import re
 from pathlib import Path
 
@@ -10,9 +11,10 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from safetensors.torch import load_file
 
 import agents
-from agents.config.agent import AgentConfig
+from agents.config.agent import AgentConfig, PpoConfig
 from agents.policies.learned import NetworkPolicy
-from agents.training.ppo import CHECKPOINT, Trainer
+from agents.training.checkpoint import CHECKPOINT
+from agents.training.ppo import PpoTrainer
 from agents.training.sb3_vector import Sb3VecEnv, split_infos
 
 AGENTS = Path(agents.__file__).parent
@@ -45,9 +47,13 @@ def make_envs(count=4, mode=AutoresetMode.SAME_STEP):
     return SyncVectorEnv([Guess] * count, autoreset_mode=mode)
 
 
-CONFIG = AgentConfig(
-    total_steps=320, num_envs=4, rollout_steps=16, batch_size=64, epochs=4, hidden=(16,), seed=3
-)
+PPO = PpoConfig(total_steps=320, num_envs=4, drives=32, rollout_steps=16, batch_size=64, epochs=4)
+CONFIG = AgentConfig(hidden=(16,), seed=3, ppo=PPO)
+
+
+def changed(**fields):
+    """`CONFIG` with other fields of PPO."""
+    return CONFIG.model_copy(update={"ppo": PPO.model_copy(update=fields)})
 
 
 def validate(policy: NetworkPolicy) -> float:
@@ -56,7 +62,7 @@ def validate(policy: NetworkPolicy) -> float:
 
 
 def make_trainer(out, *, check=validate, config=CONFIG):
-    return Trainer(Sb3VecEnv(make_envs()), NAMES, FRAMES, config, check, out)
+    return PpoTrainer(Sb3VecEnv(make_envs()), NAMES, FRAMES, config, check, out)
 
 
 def test_adapter_reports_the_end_of_an_episode_as_sb3_expects():
@@ -115,7 +121,7 @@ def test_infos_are_split_by_their_masks():
 
 def test_training_learns_and_keeps_the_best_policy(tmp_path):
     returns = []
-    config = CONFIG.model_copy(update={"total_steps": 1536, "learning_rate": 1e-2})
+    config = changed(total_steps=1536, learning_rate=1e-2)
 
     def check(policy):
         returns.append(validate(policy))
@@ -150,10 +156,28 @@ def test_interrupted_training_equals_uninterrupted(tmp_path):
 
 def test_checkpoints_of_other_runs_and_damaged_ones_are_refused(tmp_path):
     make_trainer(tmp_path).run()
-    other = CONFIG.model_copy(update={"gamma": 0.5})
+    other = changed(gamma=0.5)
     with pytest.raises(ValueError, match="another configuration"):
         make_trainer(tmp_path, config=other).run()
     # What a pickle begins with: nothing may try to read it as one.
     (tmp_path / CHECKPOINT).write_bytes(b"\x80\x04.")
     with pytest.raises(ValueError, match=r"checkpoint\.safetensors is damaged"):
         make_trainer(tmp_path).run()
+
+
+def test_checkpoints_of_other_prices_are_refused(tmp_path):
+    make_trainer(tmp_path).run()
+    with pytest.raises(ValueError, match="another configuration"):
+        PpoTrainer(
+            *(Sb3VecEnv(make_envs()), NAMES, FRAMES, CONFIG, validate, tmp_path),
+            power_price=(0.01, 0.2),
+        ).run()
+
+
+@pytest.mark.parametrize(
+    ("price", "says"),
+    [((0.2, 0.1), "low <= high"), ((0.0, 0.1), "above 0"), ((0.1, math.inf), "finite")],
+)
+def test_impossible_prices_are_refused(price, says):
+    with pytest.raises(ValueError, match=f"power_price is .*{says}"):
+        AgentConfig(power_price=price)

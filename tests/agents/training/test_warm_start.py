@@ -10,7 +10,7 @@ from test_training import CONFIG, FRAMES, NAMES, make_envs, validate
 from agents.evaluation.play import make_envs as make_shotenv, play_drives
 from agents.policies.fixed import FixedPolicy
 from agents.policies.learned import NetworkPolicy, Provenance
-from agents.training.ppo import Trainer
+from agents.training.ppo import PpoTrainer
 from agents.training.sb3_vector import Sb3VecEnv
 from agents.training.warmup import ROLLOUTS, KnownFrames, known_frames, warm_start
 from shotenv.config.keywords import env_config
@@ -58,7 +58,7 @@ def test_a_run_starts_warm_once_and_never_ends_worse(tmp_path, known):
         warm_start(network, known, seed=0)
 
     def trainer():
-        return Trainer(Sb3VecEnv(make_envs()), NAMES, FRAMES, CONFIG, validate, tmp_path, warm)
+        return PpoTrainer(Sb3VecEnv(make_envs()), NAMES, FRAMES, CONFIG, validate, tmp_path, warm)
 
     assert validate(trainer().run()) > 0.95
     assert validate(trainer().run()) > 0.95

@@ -1,0 +1,95 @@
+"""DQN and QR-DQN by the same entry: they learn, the best is kept, and Ctrl-C keeps it, too."""
+
+import sys
+
+import numpy as np
+import pytest
+from test_training import FRAMES, NAMES, make_envs, validate
+
+from agents.config.agent import AgentConfig, DqnConfig
+from agents.policies.learned import load_policy
+from agents.training.q_learning import QLearner
+from agents.training.sb3_vector import Sb3VecEnv
+
+LEARNER = DqnConfig(
+    total_steps=1200,
+    num_envs=4,
+    buffer_size=1200,
+    learning_starts=64,
+    gradient_steps=4,
+    batch_size=64,
+    learning_rate=3e-3,
+    gamma=0.0,
+    target_update=16,
+    quantiles=5,
+    validations=3,
+)
+
+
+def learner(algorithm, out, check=validate, **changes):
+    config = AgentConfig(algorithm=algorithm, hidden=(32,), seed=2, dqn=LEARNER, **changes)
+    return QLearner(Sb3VecEnv(make_envs()), NAMES, config, check, out, (0.01, 0.35))
+
+
+@pytest.mark.parametrize("algorithm", ["dqn", "qrdqn"])
+def test_both_learn_and_keep_the_best_policy(tmp_path, algorithm):
+    returns = []
+
+    def check(policy):
+        returns.append(validate(policy))
+        return returns[-1]
+
+    best = learner(algorithm, tmp_path, check).run()
+    assert not (tmp_path / "tensorboard").exists()
+    assert len(returns) == LEARNER.validations + 1
+    assert validate(best) == max(returns) > 0.9
+    kept = load_policy(tmp_path)
+    assert kept.provenance.algorithm == algorithm and kept.provenance.power_price == (0.01, 0.35)
+    assert (
+        kept.provenance.training["dqn"]["quantiles"] == 5 and "ppo" not in kept.provenance.training
+    )
+
+
+@pytest.mark.parametrize("algorithm", ["dqn", "qrdqn"])
+def test_what_is_kept_chooses_as_the_model_does(tmp_path, algorithm):
+    one = learner(algorithm, tmp_path)
+    observed = np.random.default_rng(0).uniform(-1, 1, (256, 2)).astype(np.float32)
+    expected, _ = one.model.predict(observed, deterministic=True)
+    assert len(np.unique(expected)) > 1
+    np.testing.assert_array_equal(one.policy.act(observed), expected)
+
+
+def test_ctrl_c_keeps_the_best_so_far_and_says_what_is_lost(tmp_path):
+    calls = iter((0.25, 0.5, None))
+
+    def interrupted(policy):
+        found = next(calls)
+        if found is None:
+            raise KeyboardInterrupt
+        return found
+
+    with pytest.raises(KeyboardInterrupt, match=r"best scheduler so far is in .*starts over"):
+        learner("dqn", tmp_path, interrupted).run()
+    assert load_policy(tmp_path).provenance.algorithm == "dqn"
+
+    def at_once(policy):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match=r"^the memory of dqn is not kept"):
+        learner("dqn", tmp_path / "none", at_once).run()
+
+
+def test_a_missing_package_is_named_with_its_cure(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "sb3_contrib", None)
+    with pytest.raises(ImportError, match="pip install sb3-contrib"):
+        learner("qrdqn", tmp_path)
+
+
+def test_curves_are_written_where_they_are_asked_for(tmp_path):
+    tensorboard = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    learner("dqn", tmp_path, tensorboard=True).run()
+    events = tensorboard.EventAccumulator(str(tmp_path / "tensorboard"))
+    events.Reload()
+    points = events.Scalars("validation/return")
+    assert [point.step for point in points] == [400, 800, 1200, 1200]
+    assert points[0].step > FRAMES * 4
