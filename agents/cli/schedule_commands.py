@@ -83,13 +83,14 @@ def evaluate(arguments: Namespace) -> int:
 
 def publish(arguments: Namespace, config: DemoConfig, evaluation: Evaluation) -> int:
     """Write the results and their page into `--out`, and say what they say."""
-    from agents.report import rival_note, verdict, write_evaluation, write_report
+    from agents.report import details, verdict, write_evaluation, write_report
 
     results = evaluation.results
     write_evaluation(evaluation, config, arguments.out)
     page = write_report(arguments.out)
     write_numbers(arguments, results)
-    print(f"\n{verdict(results)} {rival_note(results)}\n\nReport: {page.resolve()}")
+    told = "\n".join((verdict(results), *details(results)))
+    print(f"\n{told}\n\nReport: {page.resolve()}")
     return DONE
 
 
