@@ -29,16 +29,17 @@ def demo_arguments(parser: ArgumentParser) -> None:
 
 def run_demo(arguments: Namespace) -> int:
     """Render, train, evaluate and report: the main job, small."""
-    from agents.evaluation import evaluate_scheduler
+    from agents.evaluation import evaluate_scheduler, families_of
     from agents.training import train_scheduler
 
     config = experiment_of(arguments)
+    families_of(config.study)  # refused now, not after the training
     say(f"1/4  Bank '{config.env.bank}' and the network's predictions for it")
     prepare_bank(config.env)
     play_on_one_thread()
     say(f"2/4  PPO scheduler, {config.agent.total_steps} steps")
     scheduler = train_scheduler(config, arguments.out / "agent")
-    say("3/4  Baselines and test drives")
+    say("3/4  Rules tuned, fronts played")
     evaluation = evaluate_scheduler(config, scheduler)
     say("4/4  Report")
     return publish(arguments, config, evaluation)
@@ -71,11 +72,12 @@ def evaluate_arguments(parser: ArgumentParser) -> None:
 
 def evaluate(arguments: Namespace) -> int:
     """Judge a trained scheduler."""
-    from agents.evaluation import evaluate_scheduler
+    from agents.evaluation import check_study, evaluate_scheduler
     from agents.policies import NetworkPolicy
 
     # Loaded first: a folder without a scheduler is refused before a bank is rendered.
     scheduler, config = NetworkPolicy.load(arguments.scheduler), experiment_of(arguments)
+    check_study(config, scheduler)
     prepare_bank(config.env)
     play_on_one_thread()
     return publish(arguments, config, evaluate_scheduler(config, scheduler))

@@ -13,6 +13,11 @@ from .play import (
     make_envs as make_envs,
     play_drives as play_drives,
 )
-from .study import Evaluation as Evaluation, evaluate_scheduler as evaluate_scheduler
+from .study import (
+    Evaluation as Evaluation,
+    check_study as check_study,
+    evaluate_scheduler as evaluate_scheduler,
+    families_of as families_of,
+)
 from .summary import difference as difference, drive_rows as drive_rows, timeline as timeline
 from .tuning import Tuned as Tuned, best_at_prices as best_at_prices, tune as tune
