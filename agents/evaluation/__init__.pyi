@@ -13,6 +13,7 @@ from .play import (
     make_envs as make_envs,
     play_drives as play_drives,
 )
+from .statistics import ratio as ratio, study_interval as study_interval
 from .study import (
     Evaluation as Evaluation,
     check_study as check_study,
@@ -20,4 +21,9 @@ from .study import (
     families_of as families_of,
 )
 from .summary import difference as difference, drive_rows as drive_rows, timeline as timeline
-from .tuning import Tuned as Tuned, best_at_prices as best_at_prices, tune as tune
+from .tuning import (
+    Tuned as Tuned,
+    best_at_prices as best_at_prices,
+    tune as tune,
+    tuning_envs as tuning_envs,
+)

@@ -27,7 +27,7 @@ from agents.evaluation.price_sweep import (
     prices_of,
 )
 from agents.evaluation.summary import summary
-from agents.evaluation.tuning import Tuned, tune
+from agents.evaluation.tuning import Tuned, tune, tuning_envs
 from agents.optimum import by_clip, tabulate
 from agents.policies import (
     FAMILIES_OF_PRACTICE,
@@ -41,7 +41,7 @@ from shotenv.decision import FEATURE_NAMES, open_problem
 from unwrap.signal import Shots
 from unwrap.support import progress, say
 
-SCHEDULER: Final = "ppo"
+SCHEDULER: Final = "scheduler"
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def tune_families(config: DemoConfig) -> dict[str, dict[float, Tuned]]:
     study = config.study
     prices = sorted({*study.prices, price_of(config.env)})
     seeds = drive_seeds(study, study.tuning_drives)
-    envs = make_envs(config.env, "validation", len(seeds), "Disabled")
+    envs = tuning_envs(config.env, len(seeds))
     tuned = tune(families_of(study), envs, seeds, prices)
     return {name: {one.price: one for one in found} for name, found in tuned.items()}
 
@@ -192,6 +192,7 @@ def evaluate_scheduler(config: DemoConfig, scheduler: NetworkPolicy) -> Evaluati
     }
     # Every how many pixels each way: only of all of them there are images.
     results["every"] = problem.bank.every
+    results["algorithm"] = scheduler.provenance.algorithm
     results["config"] = config.model_dump(mode="json")
     return Evaluation(results, played)
 

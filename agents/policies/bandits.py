@@ -15,7 +15,7 @@ import numpy as np
 
 from agents.policies.looking import ENERGY_SHARES, REGRETS
 from agents.policies.policy import Action, Observation, Policy, single
-from agents.policies.readings import Readings, checked_at_least
+from agents.policies.readings import Readings, checked_at_least, checked_energy_shares
 
 CONTEXT: Final = (
     "gray_mean",
@@ -66,7 +66,7 @@ class LinearBanditPolicy(Policy):
         if not 0 < forget <= 1:
             raise ValueError(f"forget is {forget!r}; expected above 0 and at most 1")
         self.forget = forget
-        self._shares = np.asarray(energy_shares)
+        self._shares = checked_energy_shares(energy_shares)
         self._read = Readings(feature_names, "last_eight", "power_price", *CONTEXT)
         self._context: np.ndarray | None = None
 
@@ -95,6 +95,10 @@ class LinearBanditPolicy(Policy):
     def reset(self) -> None:
         """Forget all drives."""
         self._context = None
+
+    @property
+    def _parameters(self) -> str:
+        return f"width {self.width:g}, ridge {self.ridge:g}, forget {self.forget:g}"
 
     @abstractmethod
     def _judged(self, mean: np.ndarray, doubt: np.ndarray) -> np.ndarray:
@@ -126,7 +130,7 @@ class LinUcbPolicy(LinearBanditPolicy):
 
     def __str__(self) -> str:
         """The rule in words."""
-        return f"LinUCB on measured regrets, width {self.width:g}, forget {self.forget:g}"
+        return f"LinUCB on measured regrets, {self._parameters}"
 
 
 class ThompsonPolicy(LinearBanditPolicy):
@@ -162,6 +166,4 @@ class ThompsonPolicy(LinearBanditPolicy):
 
     def __str__(self) -> str:
         """The rule in words."""
-        return (
-            f"Thompson sampling of measured regrets, width {self.width:g}, forget {self.forget:g}"
-        )
+        return f"Thompson sampling of measured regrets, {self._parameters}"

@@ -16,11 +16,12 @@ from agents.policies.policy import (
     same_action,
     single,
 )
+from agents.policies.readings import checked_frames
 from unwrap.signal import Shots
 
 
 class FixedPolicy(Policy):
-    """Always the same shots.
+    """Always the same shots, as cameras are set up today.
 
     Examples
     --------
@@ -34,6 +35,10 @@ class FixedPolicy(Policy):
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
         """The same action, whatever is observed."""
         return same_action(observation, self.action)
+
+    def __str__(self) -> str:
+        """The rule in words."""
+        return f"always {tuple(Shots)[self.action]:d} DCS"
 
 
 class RandomPolicy(Policy):
@@ -54,6 +59,9 @@ class RandomPolicy(Policy):
 
 class MixturePolicy(Policy):
     """Each action with a probability of its own, whatever is observed.
+
+    What is best under a bound on mean energy may have to be mixed: Beutler and Ross, "Optimal
+    policies for controlled Markov chains with a constraint", J. Math. Anal. Appl. 112 (1985).
 
     Parameters
     ----------
@@ -93,6 +101,9 @@ class MixturePolicy(Policy):
 class CyclePolicy(Policy):
     """`shots` in every `period`-th frame, starting with the first, and `otherwise` between.
 
+    As the patent US 10,607,352 has key frames of several modulation frequencies, and between them
+    frames of one.
+
     Examples
     --------
     >>> print(CyclePolicy(4, shots=8, otherwise=2))
@@ -100,9 +111,7 @@ class CyclePolicy(Policy):
     """
 
     def __init__(self, period: int, shots: int = 8, otherwise: int = 2) -> None:
-        if period < 2:
-            raise ValueError(f"period is {period}; expected at least 2 frames")
-        self._period = period
+        self._period = checked_frames("period", period, 2)
         self._shots, self._otherwise = checked_shots(shots), checked_shots(otherwise)
         self.reset()
 

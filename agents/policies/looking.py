@@ -12,7 +12,13 @@ from typing import Any, Final
 import numpy as np
 
 from agents.policies.policy import Action, Observation, Policy, single
-from agents.policies.readings import Readings, checked_at_least, fewest_shots
+from agents.policies.readings import (
+    Readings,
+    checked_at_least,
+    checked_energy_shares,
+    checked_frames,
+    fewest_shots,
+)
 from unwrap.signal import Shots
 
 ENERGY_SHARES: Final = (0.34, 0.56, 1.0)
@@ -25,8 +31,10 @@ REGRETS: Final = ("regret_of_two", "regret_of_four")
 class PersistencePolicy(Policy):
     """The fewest shots whose regret in the last frame of 8 DCS was below a limit, held for a while.
 
-    Persistence is what forecasts are compared with: next is as last. It does not see the scene
-    change; a frame of 8 DCS comes at the start and every `period` frames.
+    Persistence is what forecasts are compared with, next is as last: Murphy, "Climatology,
+    persistence, and their linear combination as standards of reference in skill scores", Weather
+    and Forecasting 7 (1992). It does not see the scene change; a frame of 8 DCS comes at the start
+    and every `period` frames.
 
     Parameters
     ----------
@@ -38,7 +46,7 @@ class PersistencePolicy(Policy):
 
     def __init__(self, feature_names: Sequence[str], limit: float, period: int) -> None:
         self.limit = checked_at_least("limit", limit, 0.0)
-        self.period = int(checked_at_least("period", period, 2))
+        self.period = checked_frames("period", period, 2)
         self._read = Readings(feature_names, "since_eight", *REGRETS)
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
@@ -60,7 +68,9 @@ class LookAndHoldPolicy(Policy):
     """Looks with 8 DCS after a change or every n frames, then holds the fewest shots that do.
 
     A change is one of the gray image since the last look, or, because the dark shows none, one of
-    the measured amplitude.
+    the measured amplitude. Sampling where the signal has moved by a limit, and else after a longest
+    pause, is known as send-on-delta: Miskowicz, "Send-on-delta concept: an event-based data
+    reporting strategy", Sensors 6 (2006).
 
     Parameters
     ----------
@@ -71,7 +81,11 @@ class LookAndHoldPolicy(Policy):
     change : float
         Mean change of log10 ambient radiance since the last look that calls for another.
     amplitude_change : float
-        Change of log10 of the mean amplitude since the last look that does; infinite: never.
+        Change of log10 of the mean amplitude that does; infinite: never.
+    reference_frame : {0, 1}
+        Amplitude that the change is measured from: 0 is that of the look, 1 that of the frame after
+        it. Noise makes the amplitude of 2 DCS larger than that of 8: from the look, dark frames
+        seem to change once 2 DCS are held, and are looked at again.
     """
 
     def __init__(
@@ -81,9 +95,10 @@ class LookAndHoldPolicy(Policy):
         period: int,
         change: float,
         amplitude_change: float = np.inf,
+        reference_frame: int = 0,
     ) -> None:
         self.limit = checked_at_least("limit", limit, 0.0)
-        self.looks = Looks(feature_names, period, change, amplitude_change)
+        self.looks = Looks(feature_names, period, change, amplitude_change, reference_frame)
         self._read = Readings(feature_names, *REGRETS)
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
@@ -105,11 +120,13 @@ class LookAndWeighPolicy(Policy):
 
     The least of `gain` * regret + (p + h / (1 + m / `near_k`)) * energy share, with the price p of
     power that the observation tells, and m kelvin left to the trip. With a `heat_price` h it is
-    greedy with a price on heat; the costs are those of the last look, not foreseen ones.
+    greedy with a price on heat, which rises as heat piles up like that of a queue in Neely,
+    "Stochastic Network Optimization" (2010), ch. 4 (drift plus penalty); the costs are those of the
+    last look, not foreseen ones.
 
     Parameters
     ----------
-    period, change, amplitude_change
+    period, change, amplitude_change, reference_frame
         As for `LookAndHoldPolicy`.
     gain : float
         True loss for each unit of measured regret: what 8 DCS measure is noisy itself, and they see
@@ -130,6 +147,7 @@ class LookAndWeighPolicy(Policy):
         period: int,
         change: float,
         amplitude_change: float = np.inf,
+        reference_frame: int = 0,
         *,
         gain: float = 1.0,
         heat_price: float = 0.0,
@@ -139,8 +157,8 @@ class LookAndWeighPolicy(Policy):
         self.gain = checked_at_least("gain", gain, 0.0)
         self.heat_price = checked_at_least("heat_price", heat_price, 0.0)
         self.near_k = checked_at_least("near_k", near_k, 1e-6)
-        self.looks = Looks(feature_names, period, change, amplitude_change)
-        self._shares = np.asarray(energy_shares)
+        self.looks = Looks(feature_names, period, change, amplitude_change, reference_frame)
+        self._shares = checked_energy_shares(energy_shares)
         self._read = Readings(feature_names, "power_price", "heat_margin", *REGRETS)
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
@@ -167,7 +185,7 @@ class Looks:
 
     Parameters
     ----------
-    period, change, amplitude_change
+    period, change, amplitude_change, reference_frame
         As for `LookAndHoldPolicy`.
     """
 
@@ -177,35 +195,39 @@ class Looks:
         period: int,
         change: float,
         amplitude_change: float = np.inf,
+        reference_frame: int = 0,
     ) -> None:
-        self.period = int(checked_at_least("period", period, 2))
+        self.period = checked_frames("period", period, 2)
         self.change = checked_at_least("change", change, 0.0)
         self.amplitude_change = checked_at_least("amplitude_change", amplitude_change, 0.0)
+        if reference_frame not in (0, 1):
+            raise ValueError(f"reference_frame is {reference_frame!r}; expected 0 or 1")
+        self.reference_frame = reference_frame
         needed = ("since_eight", "change_since_eight", "amplitude")
         self._read = Readings(feature_names, *needed)
-        self._amplitude_at_look = np.array(0.0)
+        self._reference = np.array(0.0)
 
     def due(self, observation: Observation) -> np.ndarray:
         """Where to look in this frame, bool [] or [N]."""
         frames = np.rint(self._read.frames_since_eight(observation))
         # The feature is log10 over 3.
         amplitude = 3.0 * self._read("amplitude", observation)
-        # That of the 8 DCS themselves: 2 DCS read another where noise is all there is, and then are
-        # looked at once more. The first held frame is thus compared, too.
-        self._amplitude_at_look = np.where(frames == 0, amplitude, self._amplitude_at_look)
+        at_reference = frames <= self.reference_frame
+        self._reference = np.where(at_reference, amplitude, self._reference)
         changed = self._read("change_since_eight", observation) > self.change
-        moved = np.abs(amplitude - self._amplitude_at_look) > self.amplitude_change
+        moved = np.abs(amplitude - self._reference) > self.amplitude_change
         return changed | moved | (frames >= self.period - 1)
 
     def reset(self) -> None:
         """Forget the last look."""
-        self._amplitude_at_look = np.array(0.0)
+        self._reference = np.array(0.0)
 
     def __str__(self) -> str:
         """When to look, in words."""
-        amplitude = f" or {self.amplitude_change:g} of amplitude"
-        return (
-            f"8 DCS after a change of {self.change:g}"
-            f"{amplitude if np.isfinite(self.amplitude_change) else ''} and every "
-            f"{self.period} frames"
-        )
+        words = f"8 DCS every {self.period} frames"
+        if np.isfinite(self.change):
+            words += f", after a change of {self.change:g}"
+        if np.isfinite(self.amplitude_change):
+            since = ("the look", "the frame after it")[self.reference_frame]
+            words += f", and after one of {self.amplitude_change:g} in amplitude since {since}"
+        return words

@@ -99,3 +99,30 @@ def checked_at_least(name: str, value: float, least: float) -> float:
     if not value >= least:
         raise ValueError(f"{name} is {value!r}; expected at least {least:g}")
     return value
+
+
+def checked_frames(name: str, value: float, least: int) -> int:
+    """`value`, a number of frames among a policy's parameters.
+
+    Raises
+    ------
+    ValueError
+        It is below `least`, or no whole number.
+    """
+    if checked_at_least(name, value, least) != int(value):
+        raise ValueError(f"{name} is {value!r}; expected a whole number of frames")
+    return int(value)
+
+
+def checked_energy_shares(energy_shares: Sequence[float]) -> np.ndarray:
+    """Energy of 2, 4 and 8 DCS relative to 8, float64 [3].
+
+    Raises
+    ------
+    ValueError
+        They are not three finite numbers of at least 0.
+    """
+    shares = np.asarray(energy_shares, dtype=np.float64)
+    if shares.shape != (len(Shots),) or not ((shares >= 0) & np.isfinite(shares)).all():
+        raise ValueError(f"energy_shares is {energy_shares!r}; expected three numbers >= 0")
+    return shares

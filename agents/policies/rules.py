@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from agents.policies.policy import Action, Observation, Policy, checked_shots, single
+from agents.policies.readings import checked_at_least
 from shotenv.decision import feature_index
 
 SNR_FEATURE: Final = "signal_to_noise"
@@ -15,6 +16,9 @@ SNR_FEATURE: Final = "signal_to_noise"
 
 class SnrThresholdPolicy(Policy):
     """One threshold on the signal-to-noise ratio of the last acquisition.
+
+    As adaptive modulation picks its rate by the channel's signal-to-noise: Goldsmith and Chua,
+    "Variable-rate variable-power MQAM for fading channels", IEEE Trans. Commun. 45 (1997).
 
     Parameters
     ----------
@@ -31,7 +35,7 @@ class SnrThresholdPolicy(Policy):
         self, feature_names: Sequence[str], threshold: float, below: int, above: int
     ) -> None:
         self._index = feature_index(feature_names, SNR_FEATURE)
-        self.threshold = threshold
+        self.threshold = checked_at_least("threshold", threshold, 0.0)
         self.below, self.above = checked_shots(below), checked_shots(above)
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from agents.policies.policy import Action, Observation, Policy, checked_shots, single
-from agents.policies.readings import Readings, checked_at_least
+from agents.policies.readings import Readings, checked_at_least, checked_frames
 from unwrap.signal import Shots
 
 FRAME_S: Final = 0.1
@@ -66,8 +66,8 @@ class DistanceHysteresisPolicy(Policy):
 class WakeOnChangePolicy(Policy):
     """8 DCS while the gray image changes, fewer once it has been still for some frames.
 
-    As structured-light and stereo projectors are switched by users to save power: on with motion,
-    off after a pause.
+    As users switch the projector of a stereo camera to save power: off after ten seconds without
+    movement, on as soon as there is some (librealsense, issue 8823).
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class WakeOnChangePolicy(Policy):
         self, feature_names: Sequence[str], change: float, still_frames: int, asleep: int = 2
     ) -> None:
         self.change = checked_at_least("change", change, 0.0)
-        self.still_frames = int(checked_at_least("still_frames", still_frames, 1))
+        self.still_frames = checked_frames("still_frames", still_frames, 1)
         self.asleep = checked_shots(asleep)
         self._read = Readings(feature_names, "gray_change")
         self._still = np.array(-1)
@@ -102,10 +102,8 @@ class WakeOnChangePolicy(Policy):
 
     def __str__(self) -> str:
         """The rule in words."""
-        return (
-            f"8 DCS until the gray image changed by no more than {self.change:g} for "
-            f"{self.still_frames} frames, then {self.asleep:d}"
-        )
+        change = f" without a change of {self.change:g}" if np.isfinite(self.change) else ""
+        return f"8 DCS until {self.still_frames} frames{change}, then {self.asleep:d}"
 
 
 class MotionPolicy(Policy):
@@ -156,14 +154,17 @@ class MotionPolicy(Policy):
 
     def __str__(self) -> str:
         """The rule in words."""
-        return (
-            f"8 DCS once {self.way_m:g} m, {self.turn_rad:g} rad or a change of {self.change:g} "
-            f"lie behind the last, else {self.otherwise:d}"
-        )
+        limits = {"m": self.way_m, "rad": self.turn_rad, "of change": self.change}
+        listed = [f"{limit:g} {unit}" for unit, limit in limits.items() if np.isfinite(limit)]
+        once = f"once {' or '.join(listed)} lie behind the last" if listed else "in the first frame"
+        return f"8 DCS {once}, else {self.otherwise:d}"
 
 
 class UnsurePolicy(Policy):
     """8 DCS where the network is unsure, or where 2 and 4 DCS disagreed when last compared.
+
+    To ask for more where one's own answer is in doubt is Chow's reject option: "On optimum
+    recognition error and reject tradeoff", IEEE Trans. Inf. Theory 16 (1970).
 
     Parameters
     ----------

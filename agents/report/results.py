@@ -25,7 +25,6 @@ CURE = "`shotenv evaluate` writes it"
 RESULTS, DRIVES, TIMELINE, FRAMES = "results.json", "drives.csv", "timeline.json", "frames.npz"
 # Policies without a line here are shown by their names, without underscores.
 LABELS = {
-    "ppo": "Scheduler",
     "snr_threshold": "SNR threshold rule",
     "snr_two_thresholds": "Two SNR thresholds",
     "blind": "Best mixture of fixed choices",

@@ -104,7 +104,7 @@ room("agents.evaluation", *PLAYING)
 room("agents.training", *PLAYING, "agents.evaluation")
 room("agents.report", *PLAYING, "unwrap.pictures", "agents.evaluation")
 room("agents.deploy", *SIGNAL, "agents.policies")
-room("agents", "agents.policies", "agents.training")
+room("agents", "agents.policies", "agents.evaluation", "agents.training")
 room("agents.cli", *ROOMS)
 
 ONLY_IN = {

@@ -6,7 +6,7 @@ from agents.report.results import Strip
 from shotenv.config.families import FAMILIES
 
 RULES = ("look_and_hold", "snr_threshold")
-NAMES = ("ppo", *RULES, "cycle", "random", "always_2", "always_4", "always_8")
+NAMES = ("scheduler", *RULES, "cycle", "random", "always_2", "always_4", "always_8")
 
 
 def made_up_interval(mean, width):
@@ -45,16 +45,22 @@ def made_up_fronts(prices):
     fixed = {f"always_{shots}": shots / 8 for shots in (2, 4, 8)}
     blind = [made_up_point(None, name, 0.95 * share) for name, share in fixed.items()]
     fronts = {name: [made_up_point(0.1, "<rule>", 0.5)] for name in RULES}
-    own = [made_up_point(price, "ppo", 0.9 - i / 10) for i, price in enumerate(prices)]
+    own = [made_up_point(price, "scheduler", 0.9 - i / 10) for i, price in enumerate(prices)]
     best = [made_up_point(price, "dynamic programming", 0.4) for price in prices]
-    return {"ppo": own, **fronts, "blind": blind, "optimum": best}
+    return {"scheduler": own, **fronts, "blind": blind, "optimum": best}
 
 
 def made_up_answer(prices, better):
-    rank = {"ppo": better, "look_and_hold": 0.5, "snr_threshold": 0.1, "blind": 0.0, "optimum": 1.0}
+    rank = {
+        "scheduler": better,
+        "look_and_hold": 0.5,
+        "snr_threshold": 0.1,
+        "blind": 0.0,
+        "optimum": 1.0,
+    }
     eight = made_up_point(None, "always_8", 0.95)
     return {
-        "scheduler": "ppo",
+        "scheduler": "scheduler",
         "prices": list(prices),
         "measures": {name: made_up_measures(one) for name, one in rank.items()},
         "differences": {
@@ -66,7 +72,7 @@ def made_up_answer(prices, better):
                 }
             }
             for name, one in rank.items()
-            if name != "ppo"
+            if name != "scheduler"
         },
         "always_8": eight,
         "cool_8": {"laser_energy_share": 1.0, "depth_mae_m": 0.25},
@@ -108,14 +114,15 @@ def made_up_results(
         "policies": policies,
         "answer": made_up_answer(prices, better),
         "fronts": made_up_fronts(prices),
-        "paired_to_best_fixed": dict.fromkeys(NAMES, zero) | {"ppo": pair},
+        "paired_to_best_fixed": dict.fromkeys(NAMES, zero) | {"scheduler": pair},
         "paired_to_best_rival": {"difference": 0.4, "low": -0.2, "high": 1.1},
         "best_rival": "cycle",
+        "algorithm": "ppo",
         "every": 1,
         "drives": 24,
         "seeds": list(range(1000, 1024)),
         "versions": {"shotenv": "0.1.0", "torch": "2.13.0"},
-        "scheduler": "ppo",
+        "scheduler": "scheduler",
         "best_fixed": "always_4",
         "confidence": 0.95,
         "families": {
@@ -150,7 +157,7 @@ def made_up_timeline(frames=256):
         "release_k": 325.0,
         "family": family.tolist(),
         "policies": {
-            "ppo": played(rng.choice((2, 4, 8), frames), 0),
+            "scheduler": played(rng.choice((2, 4, 8), frames), 0),
             "always_4": played(np.full(frames, 4), 1),
         },
     }

@@ -142,21 +142,21 @@ def test_summary_pairs_every_policy_with_the_best_fixed_choice():
     study = StudyConfig(bootstrap_draws=500)
     base = np.random.default_rng(0).normal(-1, 1, (6, 4))
     played = {name: made_up_played(base - i) for i, name in enumerate(FIXED_POLICIES)}
-    played["ppo"] = made_up_played(base + 0.5)
-    results = summary(played, study, scheduler="ppo", drive_s=2.0)
+    played["scheduler"] = made_up_played(base + 0.5)
+    results = summary(played, study, scheduler="scheduler", drive_s=2.0)
     assert results["best_fixed"] == best_fixed(played) == "always_2"
-    assert results["paired_to_best_fixed"]["ppo"] == pytest.approx(
+    assert results["paired_to_best_fixed"]["scheduler"] == pytest.approx(
         {"difference": 2.0, "low": 2.0, "high": 2.0}
     )
-    assert results["best_rival"] == best_rival(played, "ppo") == "always_2"
+    assert results["best_rival"] == best_rival(played, "scheduler") == "always_2"
     assert results["paired_to_best_rival"]["difference"] == pytest.approx(2.0)
     assert results["paired_to_best_fixed"]["always_4"]["difference"] == pytest.approx(-4.0)
-    assert results["policies"]["ppo"]["energy_j"] == {"mean": 8.0, "low": 8.0, "high": 8.0}
-    assert results["families"]["ppo"] == {"garage": [0.0, 1.0, 0.0]}
+    assert results["policies"]["scheduler"]["energy_j"] == {"mean": 8.0, "low": 8.0, "high": 8.0}
+    assert results["families"]["scheduler"] == {"garage": [0.0, 1.0, 0.0]}
     # A joule in each of four frames, in two seconds.
-    assert results["policies"]["ppo"]["laser_wh_per_h"] == pytest.approx(2.0)
-    assert results["policies"]["ppo"]["life_factor"]["mean"] == pytest.approx(1.0)
-    assert difference(played["ppo"], played["ppo"], study).value == 0.0
+    assert results["policies"]["scheduler"]["laser_wh_per_h"] == pytest.approx(2.0)
+    assert results["policies"]["scheduler"]["life_factor"]["mean"] == pytest.approx(1.0)
+    assert difference(played["scheduler"], played["scheduler"], study).value == 0.0
 
 
 def test_tails_tell_what_means_hide():
@@ -247,7 +247,7 @@ def test_train_and_evaluate_write_everything_the_report_needs(config, tmp_path):
     assert results["policies"]["snr_threshold"]["rule"] in shown
     assert "trained at one price, 0.005" in shown and results["answer"]["prices"] == [0.005]
     assert {name: len(rows) for name, rows in results["fronts"].items()} == {
-        **{"ppo": 1, "fixed": 2, "snr_threshold": 2, "optimum": 2},
+        **{"scheduler": 1, "fixed": 2, "snr_threshold": 2, "optimum": 2},
         "blind": len(FIXED_POLICIES) + len(MIXTURES),
     }
     assert results["answer"]["measures"]["optimum"]["gap_closed"]["mean"] == pytest.approx(1.0)

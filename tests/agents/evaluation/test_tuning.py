@@ -1,80 +1,47 @@
 import numpy as np
 import pytest
 
-from agents.evaluation.play import PlayedDrives, make_envs, play_drives
-from agents.evaluation.tuning import best_at_prices, tune
-from agents.policies.fixed import FixedPolicy, RandomPolicy
+from agents.evaluation.play import make_envs, play_drives
+from agents.evaluation.tuning import SideBySide, best_at_prices, mean_returns, tune, tuning_envs
+from agents.policies.fixed import CyclePolicy, FixedPolicy, MixturePolicy, RandomPolicy
+from agents.policies.looking import LookAndWeighPolicy
 from agents.policies.policy import Policy
 from agents.policies.practice import PolicyFamily
 from shotenv.config.keywords import env_config
+from shotenv.decision.features import FEATURE_NAMES
 
 SEEDS = [1000, 1001]
-REWARD_SCALE = 20.0
-# Error and power terms of 2, 4 and 8 DCS: 8 are best below a price of 0.5, 2 above 1.
-ERROR, POWER = np.array([0.5, 0.3, 0.1]), np.array([0.4, 0.6, 1.0])
+FIXED = PolicyFamily("fixed", lambda names: (FixedPolicy(shots) for shots in (2, 4, 8)))
 
 
 class Knob(Policy):
-    """2 DCS where power is dear, else 8."""
+    """2 DCS where the observed price of power is above .3, else 8."""
 
     reads_price = True
 
     def act(self, observation, info=None):
-        return np.where(np.asarray(observation)[..., 0] > 0.3, 0, 2)
+        share = np.asarray(observation)[..., FEATURE_NAMES.index("power_price")]
+        return np.where(share > 0.3 / 0.35, 0, 2)
 
 
-def made_up_drives(actions, price):
-    shape = actions.shape
-    per_price = REWARD_SCALE * (POWER[1] - POWER[actions])
-    reward = REWARD_SCALE * (ERROR[1] - ERROR[actions]) + price * per_price
-    none = np.zeros(shape)
-    return PlayedDrives(
-        seeds=np.arange(shape[0]),
-        shots=np.array([2, 4, 8])[actions],
-        reward=reward,
-        laser_energy_j=none,
-        energy_j=none,
-        life_used_h=none,
-        depth_mae_m=none,
-        wrap_accuracy=none,
-        temperature_k=none,
-        family=np.full(shape, "garage"),
-        clip=none.astype(np.int64),
-        power_price=np.full(shape[0], price),
-        reward_per_price=per_price,
-    )
-
-
-def test_the_tuner_finds_the_best_candidate_at_each_price():
-    asked = []
-
-    def play_at(policy, price):
-        asked.append(price)
-        own = 0.3 if price is None else price
-        action = policy.act(np.full((2, 1), own))
-        return made_up_drives(np.repeat(action[:, None], 5, axis=1), own)
-
+def test_the_best_return_at_each_price_wins_and_the_first_of_equal_ones():
     candidates = [FixedPolicy(2), FixedPolicy(4), FixedPolicy(8)]
-    best = best_at_prices(candidates, (0.1, 0.4, 0.9, 2.0), play_at)
-    # By hand: 0.5 + 0.4 p, 0.3 + 0.6 p, 0.1 + p.
-    costs = ERROR + np.outer((0.1, 0.4, 0.9, 2.0), POWER)
-    assert [tuned.policy.action for tuned in best] == costs.argmin(axis=1).tolist() == [2, 2, 1, 0]
-    expected = 5 * REWARD_SCALE * (costs[:, 1] - costs.min(axis=1))
-    np.testing.assert_allclose([tuned.mean_return for tuned in best], expected, atol=1e-9)
-    assert asked == [None] * 3, "what does not read the price is played once"
-    asked.clear()
-    best_at_prices([Knob()], (0.1, 0.4), play_at)
-    assert asked == [0.1, 0.4]
-
-
-def test_no_candidate_is_named():
-    with pytest.raises(ValueError, match="candidates is empty"):
-        best_at_prices([], (0.1,), lambda policy, price: None)
+    returns = np.array([[1.0, 2.0, 7.0, 4.0], [0.0, 5.0, 7.0, 3.0], [9.0, 1.0, 6.0, 2.0]])
+    best = best_at_prices(candidates, returns, (0.1, 0.4, 0.9, 2.0))
+    assert [tuned.policy.action for tuned in best] == [2, 1, 0, 0]
+    assert [tuned.mean_return for tuned in best] == [9.0, 5.0, 7.0, 4.0]
+    assert [tuned.price for tuned in best] == [0.1, 0.4, 0.9, 2.0]
 
 
 @pytest.fixture(scope="module")
 def envs():
     return make_envs(env_config("default", frames_per_drive=24), "validation", 2, "Disabled")
+
+
+@pytest.fixture(scope="module")
+def many():
+    """Of six candidates at a time."""
+    return make_envs(env_config("default", frames_per_drive=24), "validation", 12, "Disabled")
 
 
 def test_returns_at_another_price_are_those_of_a_play_at_it(envs):
@@ -86,16 +53,60 @@ def test_returns_at_another_price_are_those_of_a_play_at_it(envs):
     np.testing.assert_allclose(once.returns_at(0.09), once.per_drive["return"], rtol=1e-9)
 
 
+def test_candidates_side_by_side_return_what_each_returns_alone(envs, many):
+    """With memory, drawn at random, reading the price; more and fewer than play at once."""
+    policies = [
+        *(CyclePolicy(period) for period in (2, 3, 4, 5, 6, 7)),
+        LookAndWeighPolicy(FEATURE_NAMES, 5, 0.2, 0.1),
+        MixturePolicy((0.2, 0.3, 0.5), seed=3),
+        Knob(),
+    ]
+    prices, ticks = (0.05, 0.5), []
+    together = mean_returns(policies, many, SEEDS, prices, ticks.append)
+    alone = [
+        [play_drives(one, envs, SEEDS, price=price).per_drive["return"].mean() for price in prices]
+        for one in policies
+    ]
+    np.testing.assert_allclose(together, alone, rtol=1e-9)
+    # Seven that do not read the price, six and one of them at once; two that do, twice.
+    assert ticks == [6, 1, 2, 2]
+    np.testing.assert_allclose(mean_returns(policies, envs, SEEDS, prices), alone, rtol=1e-9)
+
+
+def test_a_policy_sees_its_own_part_of_the_batch():
+    class First(Policy):
+        def act(self, observation, info=None):
+            return observation[:, 0].astype(np.int64)
+
+    batch = np.array([[2.0], [1.0], [0.0], [1.0]])
+    assert SideBySide([FixedPolicy(8), First()], 2).act(batch).tolist() == [2, 2, 0, 1]
+
+
 def test_the_tuner_on_real_drives_takes_the_best_of_what_it_played(envs):
-    family = PolicyFamily("fixed", lambda names: (FixedPolicy(shots) for shots in (2, 4, 8)))
-    (best,) = tune([family], envs, SEEDS, (5.0,))["fixed"]
-    assert best.policy.action == 0, "power this dear leaves 2 DCS alone"
-    assert best.mean_return == pytest.approx(
+    dear, free = tune([FIXED], envs, SEEDS, (5.0, 0.0))["fixed"]
+    assert dear.policy.action == 0, "power this dear leaves 2 DCS alone"
+    assert dear.mean_return == pytest.approx(
         play_drives(FixedPolicy(2), envs, SEEDS, price=5.0).per_drive["return"].mean()
     )
-    free = tune([family], envs, SEEDS, (0.0,))["fixed"][0]
-    returns = {
-        shots: play_drives(FixedPolicy(shots), envs, SEEDS, price=0.0).per_drive["return"].mean()
+    returns = [
+        play_drives(FixedPolicy(shots), envs, SEEDS, price=0.0).per_drive["return"].mean()
         for shots in (2, 4, 8)
-    }
-    assert free.mean_return == pytest.approx(max(returns.values()))
+    ]
+    assert free.policy.action == np.argmax(returns)
+    assert free.mean_return == pytest.approx(max(returns))
+
+
+def test_envs_to_tune_in_are_of_validation_drives():
+    envs = tuning_envs(env_config("default", frames_per_drive=4), 1)
+    assert envs.problem.config.split == "validation"
+    assert tune([FIXED], envs, [7], (0.1,))["fixed"][0].price == 0.1
+
+
+def test_what_cannot_be_tuned_is_named(envs):
+    with pytest.raises(ValueError, match="candidates of family 'none' are none"):
+        tune([PolicyFamily("none", lambda names: iter(()))], envs, SEEDS, (0.1,))
+    with pytest.raises(ValueError, match="prices is empty"):
+        tune([FIXED], envs, SEEDS, ())
+    for seeds in ([1, 2, 3, 4], [1, 2, 3], []):
+        with pytest.raises(ValueError, match="envs are 2; expected a multiple of the"):
+            tune([FIXED], envs, seeds, (0.1,))
