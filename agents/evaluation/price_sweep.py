@@ -105,7 +105,9 @@ def prices_of(scheduler: NetworkPolicy, prices: Sequence[float]) -> tuple[float,
     if trained is None:
         return ()
     low, high = trained
-    if low == high or "power_price" not in scheduler.feature_names:
+    if low == high:
+        return (low,)
+    if "power_price" not in scheduler.feature_names:
         # What a range of prices that it cannot see amounts to is their geometric mean.
         return (float(np.sqrt(low * high)),)
     own = tuple(sorted(price for price in prices if low <= price <= high))

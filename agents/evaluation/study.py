@@ -78,7 +78,7 @@ def families_of(study: StudyConfig) -> list[PolicyFamily]:
 def price_of(config: EnvConfig) -> float:
     """The middle of the prices that drives have: their geometric mean."""
     low, high = config.reward.power
-    return float(np.sqrt(low * high))
+    return low if low == high else float(np.sqrt(low * high))  # rounding would make it another
 
 
 def tune_families(config: DemoConfig) -> dict[str, dict[float, Tuned]]:

@@ -12,14 +12,20 @@ from agents.evaluation.acceptance import judged
 from agents.evaluation.headroom import measure_problem
 from agents.evaluation.play import FIXED_POLICIES, PlayedDrives, make_envs, play_drives
 from agents.evaluation.price_sweep import MIXTURES
-from agents.evaluation.study import evaluate_scheduler, families_of, play_all, tune_families
+from agents.evaluation.study import (
+    check_study,
+    evaluate_scheduler,
+    families_of,
+    play_all,
+    tune_families,
+)
 from agents.evaluation.summary import best_fixed, best_rival, difference, summary, tails
 from agents.optimum.choices import always, threshold
 from agents.optimum.dynamic import clairvoyant
 from agents.optimum.outcome_table import play
 from agents.optimum.tabulation import tabulate
 from agents.policies.fixed import FixedPolicy, RandomPolicy
-from agents.policies.learned import NetworkPolicy
+from agents.policies.learned import NetworkPolicy, Provenance
 from agents.policies.rules import SnrThresholdPolicy
 from agents.policies.score_networks import score_network
 from agents.report.evaluation_files import write_evaluation
@@ -65,6 +71,11 @@ def config(tiny_bank, tiny_unwrapper) -> DemoConfig:
             },
         },
     )
+
+
+def scheduler_of(power_price, names=FEATURE_NAMES):
+    told = Provenance(algorithm="none", feature_names=names, power_price=power_price)
+    return NetworkPolicy(score_network((len(names), 3), "tanh"), told)
 
 
 @pytest.fixture(scope="module")
@@ -258,8 +269,26 @@ def test_train_and_evaluate_write_everything_the_report_needs(config, tmp_path):
     assert json.loads((tmp_path / "results.json").read_text()) == evaluation.results
     rows = (tmp_path / "drives.csv").read_text().splitlines()
     assert len(rows) == 1 + len(evaluation.played) * len(SEEDS)
-    # A scheduler of another environment: its network would read other numbers as its features.
-    told = scheduler.provenance.model_copy(update={"feature_names": ("heat_margin",)})
-    other = NetworkPolicy(score_network((1, 3), "tanh"), told)
     with pytest.raises(ValueError, match="other features"):
-        evaluate_scheduler(config, other)
+        evaluate_scheduler(config, scheduler_of(None, ("heat_margin",)))
+
+
+@pytest.mark.parametrize(
+    ("trained", "says"),
+    [
+        ((0.001, 0.4), ""),
+        ((0.001, 0.1), "prices 0.3 are not played: the scheduler was trained with 0.001 to 0.1\n"),
+        ((0.005, 0.005), "trained at one price, 0.005: its front is one point\n"),
+        ((0.1, 0.4), "reward.power is 0.005 to 0.005, outside of 0.1 to 0.4, which"),
+        (None, ""),
+    ],
+)
+def test_prices_outside_of_the_training_are_named(config, capsys, trained, says):
+    check_study(config, scheduler_of(trained))
+    told = capsys.readouterr().err
+    assert says in told and bool(told) == bool(says)
+
+
+def test_a_scheduler_that_knows_none_of_the_prices_is_refused(config):
+    with pytest.raises(ValueError, match=r"prices is 0.005, 0.3; expected at least one from 0.4"):
+        check_study(config, scheduler_of((0.4, 0.5)))
