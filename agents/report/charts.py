@@ -175,7 +175,7 @@ def shares_by_family(results: dict[str, Any], names: tuple[str, ...]) -> go.Figu
 
 
 def timeline(record: dict[str, Any], scheduler: str, fixed: str) -> go.Figure:
-    """Shots, error and laser temperature of one drive, scheduler against best fixed choice."""
+    """Shots, error and laser temperature of one drive, scheduler against a fixed choice."""
     figure = make_subplots(
         rows=3,
         cols=1,

@@ -23,6 +23,7 @@ from agents.report.results import (
     FRAMES,
     RESULTS,
     TIMELINE,
+    TODAY,
     Strip,
     label,
     read_json,
@@ -66,7 +67,7 @@ def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip | 
         undefined=jinja2.StrictUndefined,  # by default a misspelt name would print nothing
     )
     panels = panels_of(strip, results["config"]["env"]["sensor"]["f1_hz"]) if strip else {}
-    scheduler, fixed = results["scheduler"], results["best_fixed"]
+    scheduler = results["scheduler"]
     # The best rule is what the scheduler has to be better than to be worth its training.
     compared = tuple(name for name in (scheduler, best_rule(results)) if name)
     return environment.get_template("report.html.jinja").render(
@@ -84,7 +85,7 @@ def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip | 
         families=list(dict.fromkeys(strip.family.tolist())) if strip else [],
         fronts=charts.figure_html(charts.fronts(results)),
         shares=charts.figure_html(charts.shares_by_family(results, compared)),
-        timeline=charts.figure_html(charts.timeline(played, scheduler, fixed)),
+        timeline=charts.figure_html(charts.timeline(played, scheduler, TODAY)),
         drive=played["drive"],
         split=results["config"]["study"]["split"],
         price=_price(results),

@@ -2,7 +2,7 @@
 
 results.json    means and intervals of every policy, paired differences, seeds, versions
 drives.csv      one row per policy and drive
-timeline.json   one drive, frame by frame, of the scheduler and of the best fixed choice
+timeline.json   one drive, frame by frame, of the scheduler and of always 8 DCS
 frames.npz      images of some of its frames: gray, wrapped map, corrected depth, truth; none of a
                 thinned bank, which has no images
 """
@@ -22,6 +22,8 @@ import numpy as np
 from unwrap.support import write_bytes, write_text
 
 CURE = "`shotenv evaluate` writes it"
+TODAY = "always_8"
+"""What a sensor without a scheduler does, and the answer compares with."""
 RESULTS, DRIVES, TIMELINE, FRAMES = "results.json", "drives.csv", "timeline.json", "frames.npz"
 # Policies without a line here are shown by their names, without underscores.
 LABELS = {

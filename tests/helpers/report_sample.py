@@ -158,7 +158,7 @@ def made_up_timeline(frames=256):
         "family": family.tolist(),
         "policies": {
             "scheduler": played(rng.choice((2, 4, 8), frames), 0),
-            "always_4": played(np.full(frames, 4), 1),
+            "always_8": played(np.full(frames, 8), 1),
         },
     }
 
