@@ -29,16 +29,17 @@ def demo_arguments(parser: ArgumentParser) -> None:
 
 def run_demo(arguments: Namespace) -> int:
     """Render, train, evaluate and report: the main job, small."""
-    from agents.evaluation import evaluate_scheduler
+    from agents.evaluation import evaluate_scheduler, families_of
     from agents.training import train_scheduler
 
     config = experiment_of(arguments)
+    families_of(config.study)  # refused now, not after the training
     say(f"1/4  Bank '{config.env.bank}' and the network's predictions for it")
     prepare_bank(config.env)
     play_on_one_thread()
     say(f"2/4  Scheduler, by {config.agent.algorithm}")
     scheduler = train_scheduler(config, arguments.out / "agent")
-    say("3/4  Baselines and test drives")
+    say("3/4  Rules tuned, fronts played")
     evaluation = evaluate_scheduler(config, scheduler)
     say("4/4  Report")
     return publish(arguments, config, evaluation)
@@ -71,11 +72,12 @@ def evaluate_arguments(parser: ArgumentParser) -> None:
 
 def evaluate(arguments: Namespace) -> int:
     """Judge a trained scheduler."""
-    from agents.evaluation import evaluate_scheduler
+    from agents.evaluation import check_study, evaluate_scheduler
     from agents.policies import NetworkPolicy
 
     # Loaded first: a folder without a scheduler is refused before a bank is rendered.
     scheduler, config = NetworkPolicy.load(arguments.scheduler), experiment_of(arguments)
+    check_study(config, scheduler)
     prepare_bank(config.env)
     play_on_one_thread()
     return publish(arguments, config, evaluate_scheduler(config, scheduler))
@@ -83,13 +85,14 @@ def evaluate(arguments: Namespace) -> int:
 
 def publish(arguments: Namespace, config: DemoConfig, evaluation: Evaluation) -> int:
     """Write the results and their page into `--out`, and say what they say."""
-    from agents.report import rival_note, verdict, write_evaluation, write_report
+    from agents.report import details, verdict, write_evaluation, write_report
 
     results = evaluation.results
     write_evaluation(evaluation, config, arguments.out)
     page = write_report(arguments.out)
     write_numbers(arguments, results)
-    print(f"\n{verdict(results)} {rival_note(results)}\n\nReport: {page.resolve()}")
+    told = "\n".join((verdict(results), *details(results)))
+    print(f"\n{told}\n\nReport: {page.resolve()}")
     return DONE
 
 

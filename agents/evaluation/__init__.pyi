@@ -14,7 +14,12 @@ from .play import (
     play_drives as play_drives,
 )
 from .statistics import ratio as ratio, study_interval as study_interval
-from .study import Evaluation as Evaluation, evaluate_scheduler as evaluate_scheduler
+from .study import (
+    Evaluation as Evaluation,
+    check_study as check_study,
+    evaluate_scheduler as evaluate_scheduler,
+    families_of as families_of,
+)
 from .summary import difference as difference, drive_rows as drive_rows, timeline as timeline
 from .tuning import (
     Tuned as Tuned,

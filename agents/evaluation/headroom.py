@@ -176,15 +176,17 @@ def _at_half_energy(fronts: dict[str, Front], study: StudyConfig) -> dict[str, A
         return resampled(of, clusters, study).named("mean")
 
     def error_of(front: Front) -> Callable[[np.ndarray], float]:
-        return lambda weight: front.error_at(HALF, weight)
+        return lambda weight: float(front.error_at(HALF, weight))
 
     def energy_of(front: Front) -> Callable[[np.ndarray], float]:
         blind = fronts["best_blind"]
-        return lambda weight: front.energy_at(blind.error_at(HALF, weight), weight)
+        return lambda weight: front.energy_at(float(blind.error_at(HALF, weight)), weight)
 
     def less_than(one: str, other: str) -> dict[str, float]:
         a, b = fronts[one], fronts[other]
-        return interval(lambda weight: 1 - a.error_at(HALF, weight) / b.error_at(HALF, weight))
+        return interval(
+            lambda weight: float(1 - a.error_at(HALF, weight) / b.error_at(HALF, weight))
+        )
 
     return {
         "error_at_half_energy": {name: interval(error_of(front)) for name, front in fronts.items()},

@@ -58,10 +58,13 @@ float64 [N, T]
     power_price: np.ndarray
     reward_per_price: np.ndarray
 
+    def rewards_at(self, price: float) -> np.ndarray:
+        """Rewards [N, T] of the same frames, had power weighed `price` in all drives."""
+        return self.reward + (price - self.power_price)[:, None] * self.reward_per_price
+
     def returns_at(self, price: float) -> np.ndarray:
-        """Returns [N] of the same frames, had power weighed `price` in the reward of all drives."""
-        other = (price - self.power_price)[:, None] * self.reward_per_price
-        return (self.reward + other).sum(axis=1)
+        """Their sums [N] over each drive."""
+        return self.rewards_at(price).sum(axis=1)
 
     @property
     def per_drive(self) -> dict[str, np.ndarray]:

@@ -6,8 +6,9 @@ resampled, each as a whole (a cluster).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from typing import TypeVar
 
 import numpy as np
 from scipy.stats import bootstrap
@@ -15,6 +16,7 @@ from scipy.stats import bootstrap
 from agents.config import StudyConfig
 
 Statistic = Callable[..., np.ndarray]
+Key = TypeVar("Key", bound=Hashable)
 MOST_DRAWS = 2000
 """Of `resampled`, whose statistics are computed one by one."""
 
@@ -46,14 +48,27 @@ def ratio(total: np.ndarray, count: np.ndarray, axis: int = -1) -> np.ndarray:
 def resampled(
     statistic: Callable[[np.ndarray], float], clusters: int, study: StudyConfig, *, seed: int = 0
 ) -> Interval:
-    """Percentile bootstrap interval of a statistic of how often each cluster counts.
+    """`resampled_each` of one statistic."""
+    return resampled_each(lambda weight: {"": statistic(weight)}, clusters, study, seed=seed)[""]
 
-    For statistics that are no plain sums, such as the error at a given energy.
+
+def resampled_each(
+    statistics: Callable[[np.ndarray], Mapping[Key, float]],
+    clusters: int,
+    study: StudyConfig,
+    *,
+    seed: int = 0,
+) -> dict[Key, Interval]:
+    """Percentile bootstrap intervals of statistics of how often each cluster counts.
+
+    For statistics that are no plain sums, such as the error at a given energy. Those of one call
+    share the resamples, as pairs do.
 
     Parameters
     ----------
-    statistic : callable
-        Of weights float64 [C]: all 1 for the point estimate, else how often each was drawn.
+    statistics : callable
+        From weights float64 [C], all 1 for the point estimates, else how often each cluster was
+        drawn, to the same keys each time.
     clusters : int
         Their number C.
     study : StudyConfig
@@ -62,10 +77,14 @@ def resampled(
     draws = np.random.default_rng(seed).multinomial(
         clusters, np.full(clusters, 1 / clusters), size=min(study.bootstrap_draws, MOST_DRAWS)
     )
-    values = [statistic(weight.astype(np.float64)) for weight in draws]
+    values = [list(statistics(weight.astype(np.float64)).values()) for weight in draws]
     tail = (1.0 - study.confidence) / 2.0
-    low, high = np.quantile(values, (tail, 1.0 - tail))
-    return Interval(statistic(np.ones(clusters)), float(low), float(high))
+    low, high = np.quantile(values, (tail, 1.0 - tail), axis=0)
+    points = statistics(np.ones(clusters))
+    return {
+        key: Interval(float(point), float(low[i]), float(high[i]))
+        for i, (key, point) in enumerate(points.items())
+    }
 
 
 def study_interval(statistic: Statistic, study: StudyConfig, *samples: np.ndarray) -> Interval:

@@ -6,7 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from agents.config import DemoConfig
+import numpy as np
+from gymnasium.vector import VectorEnv
+
+from agents.config import DemoConfig, StudyConfig
+from agents.evaluation.front_measures import BLIND, OPTIMUM, compare_fronts
 from agents.evaluation.play import (
     FIXED_POLICIES,
     PlayedDrives,
@@ -14,21 +18,30 @@ from agents.evaluation.play import (
     make_envs,
     play_drives,
 )
+from agents.evaluation.price_sweep import (
+    MIXTURES,
+    PlayedFront,
+    optimum_front,
+    play_blind,
+    play_front,
+    prices_of,
+)
 from agents.evaluation.summary import summary
-from agents.optimum import best_rule, tabulate
+from agents.evaluation.tuning import Tuned, tune, tuning_envs
+from agents.optimum import by_clip, tabulate
 from agents.policies import (
-    CyclePolicy,
+    FAMILIES_OF_PRACTICE,
     NetworkPolicy,
     Policy,
+    PolicyFamily,
     RandomPolicy,
-    SnrThresholdPolicy,
 )
+from shotenv.config import EnvConfig
 from shotenv.decision import FEATURE_NAMES, open_problem
-from unwrap.support import progress
+from unwrap.signal import Shots
+from unwrap.support import progress, say
 
-SCHEDULER: Final = "ppo"
-RULES: Final = ("snr_threshold", "cycle")
-"""Baselines that the report puts into words."""
+SCHEDULER: Final = "scheduler"
 
 
 @dataclass(frozen=True)
@@ -38,72 +51,186 @@ class Evaluation:
     Attributes
     ----------
     results : dict
-        Means, differences in pairs and their intervals: the content of `results.json`.
+        Fronts, means, differences in pairs and their intervals: the content of `results.json`.
     played : dict of str to PlayedDrives
-        The test drives under each policy.
+        The test drives under each policy, at the price that each drive has.
     """
 
     results: dict[str, Any]
     played: dict[str, PlayedDrives]
 
 
-def tune_rule(config: DemoConfig) -> SnrThresholdPolicy:
-    """The one-threshold rule with the best return on validation drives."""
-    problem = open_problem(config.env.model_copy(update={"split": "validation"}))
-    seeds = drive_seeds(config.study, config.study.tuning_drives)
-    frames = len(seeds) * config.env.frames_per_drive
-    with progress(frames, "tuning the threshold rule", "frame") as bar:
-        possible = tabulate(problem, seeds, tick=bar.update)
-    rule = best_rule(possible.table())
-    # Shots here, actions there: a policy is told what it takes, a table is indexed.
-    below, above = rule.shots
-    return SnrThresholdPolicy(FEATURE_NAMES, rule.limit, below=below, above=above)
-
-
-def baselines(config: DemoConfig) -> dict[str, Policy]:
-    """What a scheduler is compared with; the rule is tuned here."""
-    return {
-        "snr_threshold": tune_rule(config),
-        "cycle": CyclePolicy(4, shots=8, otherwise=2),  # assumed: 3.5 samples a frame
-        "random": RandomPolicy(config.study.seed),
-        **FIXED_POLICIES,
-    }
-
-
-def play_all(config: DemoConfig, policies: Mapping[str, Policy]) -> dict[str, PlayedDrives]:
-    """Every policy on the same test drives."""
-    seeds = drive_seeds(config.study, config.study.drives)
-    # The same environments for all, which remember what they measured: noise depends on drive and
-    # frame alone, so that policies that take the same shots of a frame share its cost.
-    envs = make_envs(config.env, config.study.split, len(seeds), "Disabled")
-    frames = len(policies) * len(seeds) * config.env.frames_per_drive
-    with progress(frames, f"evaluating on {config.study.split} drives", "frame") as bar:
-        return {
-            name: play_drives(policy, envs, seeds, tick=bar.update)
-            for name, policy in policies.items()
-        }
-
-
-def evaluate_scheduler(config: DemoConfig, scheduler: NetworkPolicy) -> Evaluation:
-    """Judge `scheduler` beside the baselines; nothing is written.
+def families_of(study: StudyConfig) -> list[PolicyFamily]:
+    """The families that a study names.
 
     Raises
     ------
     ValueError
-        The scheduler was trained on other features than the environment has.
+        There is none of a name.
     """
+    known = {family.name: family for family in FAMILIES_OF_PRACTICE}
+    for name in study.families:
+        if name not in known:
+            raise ValueError(f"families has {name!r}; expected of {', '.join(known)}")
+    return [known[name] for name in study.families]
+
+
+def price_of(config: EnvConfig) -> float:
+    """The middle of the prices that drives have: their geometric mean."""
+    low, high = config.reward.power
+    return low if low == high else float(np.sqrt(low * high))  # rounding would make it another
+
+
+def tune_families(config: DemoConfig) -> dict[str, dict[float, Tuned]]:
+    """Each family's best at each price of the study, and at that of the drives.
+
+    Tuned on validation drives: judged on the drives that chose it, a rule would look too good.
+    """
+    study = config.study
+    prices = sorted({*study.prices, price_of(config.env)})
+    seeds = drive_seeds(study, study.tuning_drives)
+    envs = tuning_envs(config.env, len(seeds))
+    tuned = tune(families_of(study), envs, seeds, prices)
+    return {name: {one.price: one for one in found} for name, found in tuned.items()}
+
+
+def play_all(
+    policies: Mapping[str, Policy], envs: VectorEnv, study: StudyConfig
+) -> dict[str, PlayedDrives]:
+    """Every policy on the same drives, each at the drive's own price."""
+    seeds = drive_seeds(study, study.drives)
+    with progress(len(policies), f"policies on {study.split} drives", "policy") as bar:
+        played = {}
+        for name, policy in policies.items():
+            played[name] = play_drives(policy, envs, seeds)
+            bar.update(1)
+        return played
+
+
+def play_fronts(
+    scheduler: NetworkPolicy,
+    tuned: Mapping[str, Mapping[float, Tuned]],
+    envs: VectorEnv,
+    config: DemoConfig,
+) -> dict[str, PlayedFront]:
+    """Fronts of the scheduler, of the tuned families and of blind choices, on the test drives."""
+    study = config.study
+    seeds = drive_seeds(study, study.drives)
+    own = prices_of(scheduler, study.prices) or (price_of(config.env),)
+    points = len(own) + len(tuned) * len(study.prices) + len(FIXED_POLICIES) + len(MIXTURES)
+    with progress(points, f"fronts on {study.split} drives", "point") as bar:
+        fronts = {
+            SCHEDULER: play_front(
+                lambda price: scheduler,
+                envs,
+                seeds,
+                own,
+                names=lambda policy: SCHEDULER,
+                tick=bar.update,
+            )
+        }
+        for name, of_price in tuned.items():
+            fronts[name] = play_front(
+                lambda price, of_price=of_price: of_price[price].policy,  # type: ignore[misc]
+                envs,
+                seeds,
+                study.prices,
+                tick=bar.update,
+            )
+        fronts[BLIND] = play_blind(envs, seeds, tick=bar.update)
+        return fronts
+
+
+def evaluate_scheduler(config: DemoConfig, scheduler: NetworkPolicy) -> Evaluation:
+    """Judge `scheduler` beside the policies of practice and the optimum; nothing is written.
+
+    Raises
+    ------
+    ValueError
+        The scheduler was trained on other features than the environment has, or with none of the
+        prices; or the study names a family that there is none of.
+    """
+    study = config.study
+    check_study(config, scheduler)
+    tuned = tune_families(config)
+    seeds = drive_seeds(study, study.drives)
+    # The same environments for all, which remember what they measured: noise depends on drive and
+    # frame alone, so that policies that take the same shots of a frame share its cost.
+    envs = make_envs(config.env, study.split, len(seeds), "Disabled")
+    rules = {name: found[price_of(config.env)].policy for name, found in tuned.items()}
+    policies = {
+        SCHEDULER: scheduler,
+        **rules,
+        "random": RandomPolicy(study.seed),
+        **FIXED_POLICIES,
+    }
+    played = play_all(policies, envs, study)
+    fronts = play_fronts(scheduler, tuned, envs, config)
+
+    problem = open_problem(config.env.model_copy(update={"split": study.split}))
+    frames = len(seeds) * config.env.frames_per_drive
+    with progress(frames, f"every action on {study.split} drives", "frame") as bar:
+        possible = tabulate(problem, seeds, tick=bar.update)
+    # What a derated laser would measure depends on the choices before: no table tells.
+    optimum = None if config.env.laser.derate_per_k else optimum_front(possible, study.prices)
+    cool_eight_m = by_clip(possible.table().depth_mae_m[..., Shots.EIGHT.action], possible.clips())
+
+    results = summary(played, study, scheduler=SCHEDULER, drive_s=drive_s(config.env))
+    for name, rule in rules.items():
+        results["policies"][name]["rule"] = str(rule)
+    families = {name: front for name, front in fronts.items() if name != BLIND}
+    results["answer"] = {
+        "scheduler": SCHEDULER,
+        "prices": list(fronts[SCHEDULER].prices),
+        **compare_fronts(
+            families, fronts[BLIND], optimum, cool_eight_m, study, scheduler=SCHEDULER
+        ),
+    }
+    results["fronts"] = {
+        name: front.rows
+        for name, front in {**fronts, **({OPTIMUM: optimum} if optimum else {})}.items()
+    }
+    # Every how many pixels each way: only of all of them there are images.
+    results["every"] = problem.bank.every
+    results["algorithm"] = scheduler.provenance.algorithm
+    results["config"] = config.model_dump(mode="json")
+    return Evaluation(results, played)
+
+
+def check_study(config: DemoConfig, scheduler: NetworkPolicy) -> None:
+    """Refuse what cannot be judged, and say what will not be, before anything is played.
+
+    Raises
+    ------
+    ValueError
+        See `evaluate_scheduler`.
+    """
+    families_of(config.study)
     if scheduler.feature_names != FEATURE_NAMES:
         raise ValueError(
             "the scheduler was trained on other features than this environment has; "
             "train it again (`shotenv train`)"
         )
-    policies = {SCHEDULER: scheduler, **baselines(config)}
-    played = play_all(config, policies)
-    results = summary(played, config.study, scheduler=SCHEDULER)
-    for name in RULES:
-        results["policies"][name]["rule"] = str(policies[name])
-    problem = open_problem(config.env.model_copy(update={"split": config.study.split}))
-    # Every how many pixels each way: only of all of them there are images.
-    results["every"] = problem.bank.every
-    results["config"] = config.model_dump(mode="json")
-    return Evaluation(results, played)
+    own, trained = prices_of(scheduler, config.study.prices), scheduler.provenance.power_price
+    if trained is None:
+        return
+    low, high = trained
+    left = [price for price in config.study.prices if not low <= price <= high]
+    if left and low < high:
+        say(
+            f"prices {', '.join(f'{price:g}' for price in left)} are not played: the scheduler was "
+            f"trained with {low:g} to {high:g}"
+        )
+    elif len(own) == 1:
+        say(f"the scheduler was trained at one price, {own[0]:g}: its front is one point")
+    least, most = config.env.reward.power
+    if least < low or most > high:
+        say(
+            f"reward.power is {least:g} to {most:g}, outside of {low:g} to {high:g}, which the "
+            "scheduler was trained with: expect less of it in the table of policies"
+        )
+
+
+def drive_s(config: EnvConfig) -> float:
+    """How long a drive takes, seconds."""
+    return config.frames_per_drive / config.frame_rate_hz

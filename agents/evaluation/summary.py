@@ -36,7 +36,7 @@ def best_rival(played: Mapping[str, PlayedDrives], scheduler: str) -> str:
 
 
 def summary(
-    played: Mapping[str, PlayedDrives], study: StudyConfig, *, scheduler: str
+    played: Mapping[str, PlayedDrives], study: StudyConfig, *, scheduler: str, drive_s: float
 ) -> dict[str, Any]:
     """Means, differences in pairs and their intervals: the content of `results.json`.
 
@@ -48,6 +48,8 @@ def summary(
         Bootstrap draws and confidence.
     scheduler : str
         Name of the policy that was trained.
+    drive_s : float
+        How long a drive takes, seconds.
     """
     # Both are picked on the drives that are judged, which favours them, not the scheduler.
     fixed, rival = best_fixed(played), best_rival(played, scheduler)
@@ -60,6 +62,8 @@ def summary(
                     for measure, (total, count) in one.per_clip().items()
                 },
                 "shots_share": one.shots_share(),
+                "life_factor": life_factor(one, played["always_8"], study).named("mean"),
+                **tails(one, drive_s),
             }
             for name, one in played.items()
         },
@@ -88,6 +92,46 @@ def difference(one: PlayedDrives, other: PlayedDrives, study: StudyConfig) -> In
     """Mean difference of the returns of a drive, frame by frame, one minus other."""
     (total, count), (other_total, _) = (each.per_clip()["return"] for each in (one, other))
     return study_interval(ratio, study, total - other_total, count)
+
+
+def life_factor(one: PlayedDrives, other: PlayedDrives, study: StudyConfig) -> Interval:
+    """How many times as long the laser lives as it would with another policy."""
+    (own, _), (its, _) = (each.per_clip()["life_used_h"] for each in (one, other))
+    return study_interval(ratio, study, its, own)
+
+
+def tails(one: PlayedDrives, drive_s: float) -> dict[str, Any]:
+    """What means hide: the worst that a policy did, the median drive, and how many drives tripped.
+
+    Returns
+    -------
+    dict
+        "depth_mae_p95_m": 95th percentile over frames with laser; "worst_clip": the clip with the
+        highest mean error; "highest_temperature_k"; "laser_wh_per_h": watt-hours of laser per hour
+        of driving; "tripped_drives_share": of drives with a frame without laser; "median": of
+        drives, some of the measures.
+    """
+    lit = one.shots > 0
+    error_m, frames = one.per_clip()["depth_mae_m"]
+    # A clip without any laser has no error.
+    worst = int(np.argmax(np.where(frames > 0, error_m / np.maximum(frames, 1.0), -np.inf)))
+    number = np.unique(one.clip)[worst]
+    return {
+        "depth_mae_p95_m": float(np.quantile(one.depth_mae_m[lit], 0.95)) if lit.any() else None,
+        "worst_clip": {
+            "clip": int(number),
+            "family": str(one.family[one.clip == number][0]),
+            "depth_mae_m": float(error_m[worst] / max(frames[worst], 1.0)),
+        },
+        "highest_temperature_k": float(one.temperature_k.max()),
+        # Joules a second are watt-hours an hour.
+        "laser_wh_per_h": float(one.per_drive["laser_energy_j"].mean() / drive_s),
+        "tripped_drives_share": float((~lit).any(axis=1).mean()),
+        "median": {
+            name: float(np.median(one.per_drive[name]))
+            for name in ("return", "laser_energy_j", "life_used_h", "depth_mae_m")
+        },
+    }
 
 
 def drive_rows(played: Mapping[str, PlayedDrives]) -> list[dict[str, Any]]:

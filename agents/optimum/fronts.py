@@ -1,7 +1,8 @@
 """Depth error against laser energy: what each kind of choice reaches, from cheap to dear energy.
 
-A front is a list of points, one for each price of energy. Energy is relative to 8 DCS in every
-frame with a laser that never trips; heat is left out, so that a point tells what choosing is worth.
+A front is a set of points, such as one for each price of energy. Energy is relative to 8 DCS in
+every frame with a laser that never trips. `front_of` and `blind_front` leave heat out, so that a
+point tells what choosing is worth.
 """
 
 from __future__ import annotations
@@ -21,7 +22,10 @@ PRICES = np.concatenate(([0.0], np.geomspace(1e-4, 4.0, 60)))
 
 @dataclass(frozen=True)
 class Front:
-    """Points of a front, summed clip by clip: C clips, L points with rising energy.
+    """Points of a front, summed clip by clip: C clips, L points in any order.
+
+    Two points may be mixed over time, some drives as the one and the others as the other: what a
+    front reaches is the lower convex hull of its points.
 
     Attributes
     ----------
@@ -29,29 +33,97 @@ class Front:
         Sums over the frames of each clip.
     frames : float64 [C]
         Number of them.
+
+    Examples
+    --------
+    >>> front = Front(np.array([[0.25, 1.0]]), np.array([[1.25, 0.5]]), np.ones(1))
+    >>> once = np.ones(1)
+    >>> float(front.error_at(0.625, once)), front.energy_at(0.875, once)
+    (0.875, 0.625)
     """
 
     energy: np.ndarray
     depth_mae_m: np.ndarray
     frames: np.ndarray
 
-    def points(self, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def means(self, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean energy and error of each point, [L], with each clip counted `weight` [C] times."""
         frames = weight @ self.frames
         return weight @ self.energy / frames, weight @ self.depth_mae_m / frames
 
-    def error_at(self, energy: float, weight: np.ndarray) -> float:
-        """Mean error at a mean energy, metres; between two points they are mixed."""
-        return float(np.interp(energy, *self.points(weight)))
+    def points(self, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same with energy rising."""
+        energy, error = self.means(weight)
+        rising = np.argsort(energy, kind="stable")
+        return energy[rising], error[rising]
+
+    def corners(self, weight: np.ndarray) -> np.ndarray:
+        """Numbers of the points that no mixture of others is as good as, energy rising; int64 [H].
+
+        The corners of the lower convex hull, from the least energy to the least error (Andrew's
+        monotone chain, Inf. Process. Lett. 9, 1979).
+        """
+        means = self.means(weight)
+        energy, error = (values.tolist() for values in means)  # plain numbers are faster one by one
+        corners: list[int] = []
+        # Of points with the same energy the best comes first; those after it are no corners.
+        for point in np.lexsort(means[::-1]).tolist():
+            while len(corners) > 1:
+                (x0, y0), (x1, y1) = ((energy[i], error[i]) for i in corners[-2:])
+                # A corner stays that lies below the line from the one before it to this point.
+                if (y1 - y0) * (energy[point] - x0) < (error[point] - y0) * (x1 - x0):
+                    break
+                corners.pop()
+            corners.append(point)
+        # Beyond the least error more energy buys nothing.
+        least = min(range(len(corners)), key=lambda i: error[corners[i]])
+        return np.array(corners[: least + 1])
+
+    def error_at(self, energy: float | np.ndarray, weight: np.ndarray) -> np.ndarray:
+        """Least mean error at mean energies, metres; infinite below the least energy."""
+        corners = self.corners(weight)
+        corner_energy, error = (values[corners] for values in self.means(weight))
+        return np.interp(np.asarray(energy), corner_energy, error, left=np.inf)
+
+    def reaches(self, depth_mae_m: float, weight: np.ndarray) -> bool:
+        """Whether any point errs no more than `depth_mae_m`."""
+        return bool(self.means(weight)[1].min() <= depth_mae_m)
 
     def energy_at(self, depth_mae_m: float, weight: np.ndarray) -> float:
-        """Least mean energy at which the mean error is no more than `depth_mae_m`; 1 at most."""
-        energy, error = self.points(weight)
-        # Along a front the error falls but for noise; running minima make it fall for certain.
-        falling = np.minimum.accumulate(error)
-        if depth_mae_m < falling[-1]:
+        """Least mean energy at which the mean error is no more than `depth_mae_m`.
+
+        1, all that there is, where no mixture errs so little.
+        """
+        if not self.reaches(depth_mae_m, weight):
             return 1.0
-        return float(np.interp(-depth_mae_m, -falling, energy))
+        return float(self.mixture_at(depth_mae_m, weight) @ self.means(weight)[0])
+
+    def mixture_at(self, depth_mae_m: float, weight: np.ndarray) -> np.ndarray:
+        """Share of time of each point, [L], where least energy makes the error `depth_mae_m`.
+
+        Of the ends alone beyond them. What else a point tells mixes with the same shares.
+        """
+        corners = self.corners(weight)
+        error = self.means(weight)[1][corners]
+        # `interp` wants rising numbers, and errors fall along the corners.
+        place = np.interp(-depth_mae_m, -error, np.arange(len(corners)))
+        before = min(int(place), len(corners) - 1)
+        after = min(before + 1, len(corners) - 1)
+        shares = np.zeros(self.energy.shape[1])
+        shares[corners[before]] += 1.0 - (place - before)
+        shares[corners[after]] += place - before
+        return shares
+
+    def hypervolume(self, reference_m: float, weight: np.ndarray) -> float:
+        """Area that the points dominate, up to an energy of 1 and an error of `reference_m`, m.
+
+        Of the points alone, without mixtures (Zitzler and Thiele, IEEE Trans. Evol. Comput. 3,
+        1999).
+        """
+        energy, error = self.points(weight)
+        least = np.minimum.accumulate(error)
+        width = np.diff(np.minimum(energy, 1.0), append=1.0)
+        return float(width @ np.maximum(reference_m - least, 0.0))
 
 
 def front_of(costs: np.ndarray, table: DriveTable, clips: np.ndarray) -> Front:
@@ -74,12 +146,8 @@ def front_of(costs: np.ndarray, table: DriveTable, clips: np.ndarray) -> Front:
 def blind_front(table: DriveTable, clips: np.ndarray) -> Front:
     """The front of choices that look at nothing: 2, 4 or 8 DCS drawn with fixed probabilities."""
     shape = table.depth_mae_m.shape
-    whole = _summed(np.broadcast_to(ENERGY, shape), table.depth_mae_m, clips)
-    _, error = whole.points(np.ones(len(whole.frames)))
-    # Mixing 2 and 8 DCS may be better than 4; then 4 is no point of the front.
-    mixed = np.interp(ENERGY[1], ENERGY[[0, 2]], error[[0, 2]])
-    points = [0, 1, 2] if error[1] <= mixed else [0, 2]
-    return Front(whole.energy[:, points], whole.depth_mae_m[:, points], whole.frames)
+    # Mixing 2 and 8 DCS may be better than 4; then 4 is no corner of the front.
+    return _summed(np.broadcast_to(ENERGY, shape), table.depth_mae_m, clips)
 
 
 def by_clip(values: np.ndarray, clips: np.ndarray) -> np.ndarray:

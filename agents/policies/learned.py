@@ -124,6 +124,8 @@ class NetworkPolicy(Policy):
     (2, 3)
     """
 
+    reads_price = True  # among its features
+
     def __init__(self, network: nn.Sequential, provenance: Provenance) -> None:
         self.activation = activation_of(network)
         require_widths(network, provenance.feature_names)

@@ -1,5 +1,5 @@
+from .answer import details as details, verdict as verdict
 from .evaluation_files import write_evaluation as write_evaluation
 from .page import write_report as write_report
-from .results import rival_note as rival_note, verdict as verdict
 from .scoreboard import lines_of as lines_of, match_picture as match_picture
 from .strip import take_strip as take_strip

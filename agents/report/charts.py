@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from agents.report.answer import names_in_order
 from agents.report.results import label
 from unwrap.signal import Shots
 
 SHOT_COLORS = {Shots.TWO: "#9ecae1", Shots.FOUR: "#4292c6", Shots.EIGHT: "#08407f"}
 LEVELS = (0, *Shots)
 """Samples taken, bottom to top of the time line; 0: the laser was off."""
-SYMBOLS = {"ppo": "star", "snr_threshold": "diamond", "random": "x", "cycle": "square"}
 # The colours of the page's style sheet, `report.html.jinja`.
 ACCENT, MUTED, INK = "#c2410c", "#64748b", "#1e293b"
+# Of the rules, by name; others are muted.
+FRONT_STYLES = {
+    "look_and_hold": {"color": "#0f766e", "symbol": "diamond"},
+    "look_and_weigh": {"color": "#1d4ed8", "symbol": "square"},
+    "snr_threshold": {"color": "#a16207", "symbol": "triangle-up"},
+    "cycle": {"color": "#9333ea", "symbol": "cross"},
+    "blind": {"color": MUTED, "symbol": "x-thin-open", "dash": "dot"},
+    "optimum": {"color": INK, "dash": "dash"},
+}
+LABEL_SHARE = 0.045
+"""Share of energy that the label of a price takes of the chart's width, on a wide page."""
+FIXED = ("always_2", "always_4", "always_8")
 # Of the families that networks and schedulers are trained on; others share one gray.
 FAMILY_COLORS = {
     "sunny_road": "#fde68a",
@@ -37,52 +50,92 @@ def figure_html(figure: go.Figure) -> str:
     return figure.to_html(full_html=False, include_plotlyjs=False, config=CONFIG)
 
 
-def error_against_energy(results: dict[str, Any]) -> go.Figure:
-    """Depth error against laser energy, one marker with two intervals per policy."""
-    # Labels are placed by hand: plotly lets those of policies that lie close overlap.
-    figure = go.Figure()
-    by_energy = sorted(
-        results["policies"].items(), key=lambda item: item[1]["laser_energy_j"]["mean"]
-    )
-    top_m = max(policy["depth_mae_m"]["high"] for _, policy in by_energy)
-    # Each label in a row of its own, left of its line: no line crosses another policy's label.
-    row_m = top_m / 16
-    for place, (name, policy) in enumerate(by_energy):
-        energy, error = policy["laser_energy_j"], policy["depth_mae_m"]
-        chosen = name == results["scheduler"]
-        color = ACCENT if chosen else MUTED
+def fronts(results: dict[str, Any]) -> go.Figure:
+    """Depth error against laser energy: every point played, the scheduler's with their prices."""
+    figure, answer = go.Figure(), results["answer"]
+    # What matters is drawn last, above the others.
+    for name, text in reversed(names_in_order(results)):
+        rows = sorted(results["fronts"][name], key=lambda row: row["laser_energy_share"])
+        chosen = name == answer["scheduler"]
+        style = FRONT_STYLES.get(name, {})
+        color = ACCENT if chosen else style.get("color", MUTED)
+        best = undominated(rows)
+        # A line along the points that no other of the family beats in both; all as markers.
         figure.add_scatter(
-            x=[energy["mean"]],
-            y=[error["mean"]],
-            error_x=_whiskers(energy, color),
-            error_y=_whiskers(error, color),
-            mode="markers",
-            marker={
-                "size": 13 if chosen else 10,
+            x=[row["laser_energy_share"] for row in best],
+            y=[row["depth_mae_m"] for row in best],
+            mode="lines",
+            line={
                 "color": color,
-                "symbol": SYMBOLS.get(name, "circle"),
+                "width": 2.4 if chosen else 1,
+                "dash": style.get("dash", "solid"),
             },
-            name=label(name),
-            hovertemplate="%{x:.1f} J<br>%{y:.3f} m<extra>" + label(name) + "</extra>",
+            legendgroup=name,
+            showlegend=False,
+            hoverinfo="skip",
         )
+        figure.add_scatter(
+            x=[row["laser_energy_share"] for row in rows],
+            y=[row["depth_mae_m"] for row in rows],
+            mode="markers+text" if chosen else "markers",
+            marker={
+                "size": 10 if chosen else 6,
+                "color": color,
+                "symbol": style.get("symbol", "circle"),
+            },
+            text=prices_apart(rows) if chosen else None,
+            textposition="bottom left",
+            textfont={"color": color, "size": 11},
+            legendgroup=name,
+            name=text,
+            customdata=[_point(row) for row in rows],
+            hovertemplate="%{x:.1%}, %{y:.3f} m<br>%{customdata}<extra>" + text + "</extra>",
+        )
+    for name in FIXED:
+        row = next(row for row in results["fronts"]["blind"] if row["policy"] == name)
         figure.add_annotation(
-            x=energy["mean"],
-            y=error["mean"],
-            text=f"<b>{label(name)}</b>" if chosen else label(name),
-            font={"color": color, "size": 12},
-            arrowcolor=color,
-            arrowwidth=0.8,
-            arrowhead=0,
-            standoff=7,
-            ax=0,
-            ayref="y",
-            ay=top_m + row_m * (1 + place),
-            xanchor="right",
+            x=row["laser_energy_share"],
+            y=row["depth_mae_m"],
+            text=label(name),
+            font={"color": MUTED, "size": 11},
+            showarrow=False,
+            xanchor="left" if name == "always_2" else "center",
+            yshift=13,
         )
-    figure.update_xaxes(title="laser energy per drive, J", rangemode="tozero", **AXIS)
-    span_m = [0, top_m + row_m * (len(by_energy) + 1)]
-    figure.update_yaxes(title="mean absolute depth error, m", range=span_m, **AXIS)
-    return _styled(figure, height=430, showlegend=False)
+    figure.add_hline(
+        y=answer["always_8"]["depth_mae_m"], line={"color": INK, "width": 1, "dash": "dot"}
+    )
+    figure.update_xaxes(
+        title="share of laser energy",
+        tickformat=".0%",
+        range=[0.2, 1.02],
+        **AXIS,
+    )
+    figure.update_yaxes(title="mean absolute depth error, m", rangemode="tozero", **AXIS)
+    # Below the chart: beside it the names would leave a phone no room for the points.
+    legend = {"orientation": "h", "x": 0, "y": -0.2, "yanchor": "top", "traceorder": "reversed"}
+    return _styled(figure, height=520, legend=legend)
+
+
+def undominated(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Of points with rising energy those that err less than all before."""
+    least = np.minimum.accumulate([row["depth_mae_m"] for row in rows])
+    return [row for i, row in enumerate(rows) if i == 0 or row["depth_mae_m"] < least[i - 1]]
+
+
+def prices_apart(rows: list[dict[str, Any]]) -> list[str]:
+    """Prices as labels of points with rising energy; none where it would cover that before."""
+    labels, last = [], -np.inf
+    for row in rows:
+        free = row["laser_energy_share"] - last >= LABEL_SHARE
+        labels.append(f"{row['price']:g}" if free else "")
+        last = row["laser_energy_share"] if free else last
+    return labels
+
+
+def _point(row: dict[str, Any]) -> str:
+    at = "" if row["price"] is None else f"price {row['price']:g}: "
+    return at + textwrap.fill(label(row["policy"]), 60).replace("\n", "<br>")
 
 
 def shares_by_family(results: dict[str, Any], names: tuple[str, ...]) -> go.Figure:
@@ -122,7 +175,7 @@ def shares_by_family(results: dict[str, Any], names: tuple[str, ...]) -> go.Figu
 
 
 def timeline(record: dict[str, Any], scheduler: str, fixed: str) -> go.Figure:
-    """Shots, error and laser temperature of one drive, scheduler against best fixed choice."""
+    """Shots, error and laser temperature of one drive, scheduler against a fixed choice."""
     figure = make_subplots(
         rows=3,
         cols=1,
@@ -177,18 +230,6 @@ def _styled(
         plot_bgcolor="rgba(0,0,0,0)",
         **layout,
     )
-
-
-def _whiskers(interval: dict[str, float], color: str) -> dict[str, Any]:
-    return {
-        "type": "data",
-        "symmetric": False,
-        "array": [interval["high"] - interval["mean"]],
-        "arrayminus": [interval["mean"] - interval["low"]],
-        "thickness": 1.2,
-        "width": 4,
-        "color": color,
-    }
 
 
 def _family(name: str) -> str:

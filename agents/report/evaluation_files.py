@@ -11,6 +11,7 @@ from agents.report.results import (
     FRAMES,
     RESULTS,
     TIMELINE,
+    TODAY,
     write_drives,
     write_strip,
 )
@@ -27,7 +28,7 @@ def write_evaluation(evaluation: Evaluation, config: DemoConfig, folder: Path) -
     """
     results, played = evaluation.results, evaluation.played
     scheduler = played[results["scheduler"]]
-    compared = {name: played[name] for name in (results["scheduler"], results["best_fixed"])}
+    compared = {name: played[name] for name in (results["scheduler"], TODAY)}
     laser, rate_hz = config.env.laser, config.env.frame_rate_hz
     # One drive, by a rule and not by hand: the page shows no drive that someone picked.
     shown = drive_to_show(scheduler)

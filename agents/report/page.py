@@ -12,17 +12,22 @@ import numpy as np
 from plotly.offline import get_plotlyjs
 
 from agents.report import charts
+from agents.report.answer import (
+    best_rule,
+    details,
+    names_in_order,
+    percent,
+    verdict,
+)
 from agents.report.results import (
     FRAMES,
     RESULTS,
     TIMELINE,
+    TODAY,
     Strip,
-    interval_in_words,
     label,
     read_json,
     read_strip,
-    rival_note,
-    verdict,
 )
 from unwrap.pictures import CYCLIC, ERROR, GRAY, VIRIDIS, ColorMap, picture
 from unwrap.signal import GRAY_FULL_SCALE
@@ -31,8 +36,6 @@ from unwrap.support import write_text
 REPORT = "report.html"
 LARGEST_ERROR_M = 1.0  # assumed: a wrong wrap is six times that, a right one a tenth
 GRAY_GAMMA = 0.5  # assumed: a linear image is too dark to look at
-MINUS = "\u2212"
-"""As wide as a plus; the cards set their numbers large."""
 
 
 def write_report(folder: Path) -> Path:
@@ -64,23 +67,28 @@ def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip | 
         undefined=jinja2.StrictUndefined,  # by default a misspelt name would print nothing
     )
     panels = panels_of(strip, results["config"]["env"]["sensor"]["f1_hz"]) if strip else {}
-    scheduler, fixed = results["scheduler"], results["best_fixed"]
-    # The rule is what the scheduler has to be better than to be worth its training.
-    compared = tuple(name for name in (scheduler, "snr_threshold") if name in results["policies"])
+    scheduler = results["scheduler"]
+    # The best rule is what the scheduler has to be better than to be worth its training.
+    compared = tuple(name for name in (scheduler, best_rule(results)) if name)
     return environment.get_template("report.html.jinja").render(
         results=results,
         verdict=verdict(results),
-        rival_note=rival_note(results),
+        details=details(results),
+        percent=percent,
+        answer=results["answer"],
+        families_measured=_families(results),
+        knob=_knob(results),
         rows=_rows(results),
         cards=_cards(results),
         panels=[{"key": key, "title": panel.title, **panel.scale} for key, panel in panels.items()],
         frames=json.dumps(_frames(strip, panels)) if strip else None,
         families=list(dict.fromkeys(strip.family.tolist())) if strip else [],
-        scatter=charts.figure_html(charts.error_against_energy(results)),
+        fronts=charts.figure_html(charts.fronts(results)),
         shares=charts.figure_html(charts.shares_by_family(results, compared)),
-        timeline=charts.figure_html(charts.timeline(played, scheduler, fixed)),
+        timeline=charts.figure_html(charts.timeline(played, scheduler, TODAY)),
         drive=played["drive"],
         split=results["config"]["study"]["split"],
+        price=_price(results),
         shot_colors={str(shots): color for shots, color in charts.SHOT_COLORS.items()},
         plotly=get_plotlyjs(),  # all 4 MB of it: the page is read without a network
     )
@@ -102,34 +110,67 @@ def _rows(results: dict[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _cards(results: dict[str, Any]) -> list[dict[str, str]]:
-    """The few numbers to remember, scheduler against best fixed choice."""
-    scheduler = results["policies"][results["scheduler"]]
-    fixed = results["policies"][results["best_fixed"]]
-    pair = results["paired_to_best_fixed"][results["scheduler"]]
-    against = label(results["best_fixed"])
+def _families(results: dict[str, Any]) -> list[dict[str, Any]]:
+    """Rows of the table of fronts."""
+    answer = results["answer"]
     return [
         {
-            "title": "Return, difference",
-            "value": f"{pair['difference']:+.1f}".replace("-", MINUS),
-            "note": interval_in_words(results["confidence"], pair).replace("-", MINUS),
-        },
-        _card("Laser energy", "J", scheduler["laser_energy_j"], fixed["laser_energy_j"], against),
-        _card("Depth error", "m", scheduler["depth_mae_m"], fixed["depth_mae_m"], against),
+            "label": text,
+            "chosen": name == answer["scheduler"],
+            "gap_closed": None,  # where the optimum is not known
+            **answer["measures"][name],
+        }
+        for name, text in names_in_order(results)
+    ]
+
+
+def _knob(results: dict[str, Any]) -> list[dict[str, Any]]:
+    """What each price that the scheduler was played at comes to, against always 8 DCS."""
+    eight = results["answer"]["always_8"]
+    return [
         {
-            "title": "Laser off",
-            "value": f"{scheduler['tripped_share']['mean']:.1%}",
-            "note": f"of frames, tripped; {against}: {fixed['tripped_share']['mean']:.1%}",
+            **row,
+            "saved": percent(1.0 - row["laser_energy_share"] / eight["laser_energy_share"]),
+            "more_error": percent(row["depth_mae_m"] / eight["depth_mae_m"] - 1.0),
+            "life_factor": eight["life_used_per_frame_h"] / row["life_used_per_frame_h"],
+            "cooler_k": eight["temperature_k"] - row["temperature_k"],
+        }
+        for row in results["fronts"][results["scheduler"]]
+    ]
+
+
+def _price(results: dict[str, Any]) -> str:
+    """Price of power in the drives of the table of policies."""
+    low, high = results["config"]["env"]["reward"]["power"]
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}, drawn for each drive"
+
+
+def _cards(results: dict[str, Any]) -> list[dict[str, str]]:
+    """The few numbers to remember, scheduler against always 8 DCS."""
+    own = results["answer"]["measures"][results["scheduler"]]
+    life, half = own["life_factor_at_10_percent_more"], own["error_at_half_energy"]
+    return [
+        _saved("Energy saved, same error", own["energy_saved_at_equal_error"]),
+        _saved("Energy saved, 10 % more error", own["energy_saved_at_10_percent_more"]),
+        {
+            "title": "Laser life, 10 % more error",
+            "value": f"{life['mean']:.1f} times",
+            "note": f"that with always 8 DCS; {life['low']:.1f} to {life['high']:.1f}",
+        },
+        {
+            "title": "Error at half the energy",
+            "value": f"{half['mean']:.2f} m",
+            "note": f"{half['low']:.2f} to {half['high']:.2f} m; best mixture of fixed choices "
+            f"{results['answer']['measures']['blind']['error_at_half_energy']['mean']:.2f} m",
         },
     ]
 
 
-def _card(title: str, unit: str, ours: dict, theirs: dict, against: str) -> dict[str, str]:
-    change = f"{ours['mean'] / theirs['mean'] - 1.0:+.0%}".replace("-", MINUS)
+def _saved(title: str, share: dict[str, float]) -> dict[str, str]:
     return {
         "title": title,
-        "value": f"{ours['mean']:.3g} {unit}",
-        "note": f"{change} against {against} ({theirs['mean']:.3g} {unit})",
+        "value": percent(share["mean"]),
+        "note": f"{percent(share['low'])} to {percent(share['high'])}, against always 8 DCS",
     }
 
 

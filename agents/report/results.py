@@ -2,7 +2,7 @@
 
 results.json    means and intervals of every policy, paired differences, seeds, versions
 drives.csv      one row per policy and drive
-timeline.json   one drive, frame by frame, of the scheduler and of the best fixed choice
+timeline.json   one drive, frame by frame, of the scheduler and of always 8 DCS
 frames.npz      images of some of its frames: gray, wrapped map, corrected depth, truth; none of a
                 thinned bank, which has no images
 """
@@ -22,13 +22,15 @@ import numpy as np
 from unwrap.support import write_bytes, write_text
 
 CURE = "`shotenv evaluate` writes it"
+TODAY = "always_8"
+"""What a sensor without a scheduler does, and the answer compares with."""
 RESULTS, DRIVES, TIMELINE, FRAMES = "results.json", "drives.csv", "timeline.json", "frames.npz"
 # Policies without a line here are shown by their names, without underscores.
 LABELS = {
-    "ppo": "PPO scheduler",
     "snr_threshold": "SNR threshold rule",
-    "cycle": "Cycle",
-    "random": "Random",
+    "snr_two_thresholds": "Two SNR thresholds",
+    "blind": "Best mixture of fixed choices",
+    "optimum": "Optimum, knows all",
     "always_2": "Always 2 DCS",
     "always_4": "Always 4 DCS",
     "always_8": "Always 8 DCS",
@@ -74,57 +76,12 @@ class Strip:
 
 def label(name: str) -> str:
     """A policy's name as it is shown."""
-    return LABELS.get(name, name.replace("_", " "))
+    # Not `capitalize`, which would make "dcs" of "DCS".
+    return LABELS.get(name, name[:1].upper() + name[1:].replace("_", " "))
 
 
-def verdict(results: dict[str, Any]) -> str:
-    """Whether the scheduler beats the best fixed choice: one sentence with its interval."""
-    scheduler, fixed = results["scheduler"], results["best_fixed"]
-    pair = results["paired_to_best_fixed"][scheduler]
-    interval = interval_in_words(results["confidence"], pair)
-    against = f"the best fixed choice, {_in_a_sentence(fixed)}"
-    drives = f"over {results['drives']} {results['config']['study']['split']} drives"
-    if pair["low"] <= 0.0 <= pair["high"]:
-        return (
-            f"No significant difference: the trained scheduler's return is "
-            f"{pair['difference']:+.1f} from that of {against}, {drives}, and the {interval} "
-            "includes zero."
-        )
-    beats = "beats" if pair["difference"] > 0 else "does worse than"
-    changes = []
-    for measure, words in (("depth_mae_m", "depth error"), ("laser_energy_j", "laser energy")):
-        own, other = (results["policies"][name][measure]["mean"] for name in (scheduler, fixed))
-        change = own / other - 1.0
-        changes.append(f"{abs(change):.0%} {'less' if change < 0 else 'more'} {words}")
-    return (
-        f"The trained scheduler {beats} {against}, by {abs(pair['difference']):.1f} in return "
-        f"({interval}) {drives}, with {' and '.join(changes)}."
-    )
-
-
-def rival_note(results: dict[str, Any]) -> str:
-    """How the scheduler does against the strongest other policy, in one sentence."""
-    pair, rival = results["paired_to_best_rival"], _in_a_sentence(results["best_rival"])
-    interval = interval_in_words(results["confidence"], pair)
-    known = "" if pair["low"] * pair["high"] > 0.0 else ", which includes zero"
-    return (
-        f"Against the strongest of the other policies, {rival}, its return is "
-        f"{pair['difference']:+.1f} ({interval}{known})."
-    )
-
-
-def interval_in_words(confidence: float, pair: dict[str, float]) -> str:
-    """The interval of a difference of returns.
-
-    Examples
-    --------
-    >>> interval_in_words(0.95, {"difference": 0.6, "low": -0.2, "high": 1.25})
-    '95% interval -0.2 to +1.2'
-    """
-    return f"{confidence:.0%} interval {pair['low']:+.1f} to {pair['high']:+.1f}"
-
-
-def _in_a_sentence(name: str) -> str:
+def in_a_sentence(name: str) -> str:
+    """The same within a sentence."""
     # Labels begin with a capital; abbreviations keep theirs.
     return label(name).lower().replace("dcs", "DCS").replace("snr", "SNR")
 

@@ -180,14 +180,16 @@ def test_demo_does_the_main_job(capsys, tmp_path, tiny):
     small = "--agent.ppo.total_steps 64 --agent.ppo.num_envs 2 --agent.ppo.rollout_steps 16"
     small += " --agent.ppo.batch_size 16"
     small += " --env.frames_per_drive 16 --study.drives 2 --study.tuning_drives 2"
-    small += " --study.bootstrap_draws 100"
+    small += " --study.bootstrap_draws 100 --study.prices [0.01,0.1]"
+    small += " --study.families [snr_threshold,cycle]"
     words = ("demo", "--out", out, "--json", tmp_path / "n.json", *small.split(), *tiny)
     status, printed, _ = run(capsys, *words)
     assert status == 0 and printed.rstrip().endswith(str(out / "report.html"))
+    assert "At half the laser energy of 8 DCS in every frame it errs" in printed
     results = json.loads((out / "results.json").read_text())
     assert results == json.loads((tmp_path / "n.json").read_text())
     assert set(results["policies"]) == {
-        *("ppo", "snr_threshold", "cycle", "random"),
+        *("scheduler", "snr_threshold", "cycle", "random"),
         *("always_2", "always_4", "always_8"),
     }
     for policy in results["policies"].values():

@@ -11,18 +11,21 @@ from agents.config.study_config import StudyConfig
 from agents.evaluation.acceptance import judged
 from agents.evaluation.headroom import measure_problem
 from agents.evaluation.play import FIXED_POLICIES, PlayedDrives, make_envs, play_drives
+from agents.evaluation.price_sweep import MIXTURES
 from agents.evaluation.study import (
+    check_study,
     evaluate_scheduler,
+    families_of,
     play_all,
-    tune_rule,
+    tune_families,
 )
-from agents.evaluation.summary import best_fixed, best_rival, difference, summary
-from agents.optimum.choices import always, best_rule, threshold
+from agents.evaluation.summary import best_fixed, best_rival, difference, summary, tails
+from agents.optimum.choices import always, threshold
 from agents.optimum.dynamic import clairvoyant
 from agents.optimum.outcome_table import play
 from agents.optimum.tabulation import tabulate
 from agents.policies.fixed import FixedPolicy, RandomPolicy
-from agents.policies.learned import NetworkPolicy
+from agents.policies.learned import NetworkPolicy, Provenance
 from agents.policies.rules import SnrThresholdPolicy
 from agents.policies.score_networks import score_network
 from agents.report.evaluation_files import write_evaluation
@@ -59,9 +62,20 @@ def config(tiny_bank, tiny_unwrapper) -> DemoConfig:
                 "protect": False,
             },
             "agent": {"total_steps": 96, "num_envs": 2, "rollout_steps": 24, "batch_size": 16},
-            "study": {"drives": 3, "tuning_drives": 2, "bootstrap_draws": 200},
+            "study": {
+                "drives": 3,
+                "tuning_drives": 2,
+                "bootstrap_draws": 200,
+                "prices": [0.005, 0.3],
+                "families": ["fixed", "snr_threshold"],
+            },
         },
     )
+
+
+def scheduler_of(power_price, names=FEATURE_NAMES):
+    told = Provenance(algorithm="none", feature_names=names, power_price=power_price)
+    return NetworkPolicy(score_network((len(names), 3), "tanh"), told)
 
 
 @pytest.fixture(scope="module")
@@ -139,29 +153,62 @@ def test_summary_pairs_every_policy_with_the_best_fixed_choice():
     study = StudyConfig(bootstrap_draws=500)
     base = np.random.default_rng(0).normal(-1, 1, (6, 4))
     played = {name: made_up_played(base - i) for i, name in enumerate(FIXED_POLICIES)}
-    played["ppo"] = made_up_played(base + 0.5)
-    results = summary(played, study, scheduler="ppo")
+    played["scheduler"] = made_up_played(base + 0.5)
+    results = summary(played, study, scheduler="scheduler", drive_s=2.0)
     assert results["best_fixed"] == best_fixed(played) == "always_2"
-    assert results["paired_to_best_fixed"]["ppo"] == pytest.approx(
+    assert results["paired_to_best_fixed"]["scheduler"] == pytest.approx(
         {"difference": 2.0, "low": 2.0, "high": 2.0}
     )
-    assert results["best_rival"] == best_rival(played, "ppo") == "always_2"
+    assert results["best_rival"] == best_rival(played, "scheduler") == "always_2"
     assert results["paired_to_best_rival"]["difference"] == pytest.approx(2.0)
     assert results["paired_to_best_fixed"]["always_4"]["difference"] == pytest.approx(-4.0)
-    assert results["policies"]["ppo"]["energy_j"] == {"mean": 8.0, "low": 8.0, "high": 8.0}
-    assert results["families"]["ppo"] == {"garage": [0.0, 1.0, 0.0]}
-    assert difference(played["ppo"], played["ppo"], study).value == 0.0
+    assert results["policies"]["scheduler"]["energy_j"] == {"mean": 8.0, "low": 8.0, "high": 8.0}
+    assert results["families"]["scheduler"] == {"garage": [0.0, 1.0, 0.0]}
+    # A joule in each of four frames, in two seconds.
+    assert results["policies"]["scheduler"]["laser_wh_per_h"] == pytest.approx(2.0)
+    assert results["policies"]["scheduler"]["life_factor"]["mean"] == pytest.approx(1.0)
+    assert difference(played["scheduler"], played["scheduler"], study).value == 0.0
 
 
-def test_the_best_rule_is_the_best_on_the_drives_that_tuned_it(config):
-    rule = tune_rule(config)
-    problem = open_problem(config.env.model_copy(update={"split": "validation"}))
-    table = tabulate(problem, [1000, 1001]).table()
-    best = best_rule(table)
-    assert (rule.threshold, rule.below.action, rule.above.action) == best
-    cost = play(table, threshold(*best)).cost.sum()
-    for limit in (0.2, 0.5, 0.8):
-        assert cost <= play(table, threshold(limit, 2, 0)).cost.sum() + 1e-9
+def test_tails_tell_what_means_hide():
+    played = made_up_played(np.zeros((4, 5)))
+    error_m = 0.1 * np.ones((4, 5))
+    error_m[3] = 2.0  # clip 1, beside a drive without fault
+    shots = np.full((4, 5), 8)
+    shots[0, 2] = 0
+    family = np.where(np.arange(4)[:, None] < 2, "garage", "tunnel") * np.ones((1, 5), object)
+    error_m[0, 2] = np.nan
+    temperature_k = 300 + np.arange(20.0).reshape(4, 5)
+    told = tails(
+        dataclasses.replace(
+            played,
+            depth_mae_m=error_m,
+            shots=shots,
+            family=family.astype(str),
+            temperature_k=temperature_k,
+        ),
+        drive_s=0.5,
+    )
+    assert told["worst_clip"] == {
+        "clip": 1,
+        "family": "tunnel",
+        "depth_mae_m": pytest.approx((2.0 + 0.1) / 2),
+    }
+    assert told["depth_mae_p95_m"] == 2.0 and told["highest_temperature_k"] == 319.0
+    assert told["tripped_drives_share"] == 0.25 and told["laser_wh_per_h"] == 10.0
+    assert told["median"]["depth_mae_m"] == pytest.approx(0.1)
+
+
+def test_families_are_tuned_at_every_price_and_at_that_of_the_drives(config):
+    dear = merged(config, {"study": {"prices": [0.3, 5.0], "families": ["fixed"]}})
+    tuned = tune_families(dear)["fixed"]
+    assert set(tuned) == {0.005, 0.3, 5.0}
+    assert tuned[5.0].policy.action == 0, "power this dear leaves 2 DCS alone"
+
+
+def test_a_family_that_there_is_none_of_is_named(config):
+    with pytest.raises(ValueError, match="families has 'guess'; expected of fixed, cycle"):
+        families_of(merged(config, {"study": {"families": ["guess"]}}).study)
 
 
 def test_problem_numbers_follow_the_weights(config, possible):
@@ -176,7 +223,8 @@ def test_problem_numbers_follow_the_weights(config, possible):
 
 
 def test_strip_shows_the_frames_that_were_played(config):
-    played = play_all(config, {"always_8": FixedPolicy(8)})["always_8"]
+    envs = make_envs(config.env, "test", config.study.drives, "Disabled")
+    played = play_all({"always_8": FixedPolicy(8)}, envs, config.study)["always_8"]
     problem = open_problem(config.env.model_copy(update={"split": "test"}))
     strip = take_strip(problem, played)
     assert set(strip.family.tolist()) == set(played.family.ravel().tolist())
@@ -204,18 +252,43 @@ def test_train_and_evaluate_write_everything_the_report_needs(config, tmp_path):
     shown = text_of(write_report(tmp_path).read_text())
     assert "Every policy drove the same 3 drives of the test split" in shown
     assert "over 3 test drives" in shown and "Wrapped map, 24 MHz" in shown
-    for policy in ("PPO scheduler", "SNR threshold rule", "Random", "Always 8 DCS"):
+    for policy in ("Scheduler", "SNR threshold rule", "Random", "Always 8 DCS"):
         assert policy in shown
-    for name in ("snr_threshold", "cycle"):
-        assert evaluation.results["policies"][name]["rule"] in shown
+    results = evaluation.results
+    assert results["policies"]["snr_threshold"]["rule"] in shown
+    assert "trained at one price, 0.005" in shown and results["answer"]["prices"] == [0.005]
+    assert {name: len(rows) for name, rows in results["fronts"].items()} == {
+        **{"scheduler": 1, "fixed": 2, "snr_threshold": 2, "optimum": 2},
+        "blind": len(FIXED_POLICIES) + len(MIXTURES),
+    }
+    assert results["answer"]["measures"]["optimum"]["gap_closed"]["mean"] == pytest.approx(1.0)
+    assert results["answer"]["measures"]["blind"]["gap_closed"]["mean"] == pytest.approx(0.0)
     assert {path.name for path in tmp_path.iterdir()} == {
         *("agent", "results.json", "drives.csv", "timeline.json", "frames.npz", "report.html")
     }
     assert json.loads((tmp_path / "results.json").read_text()) == evaluation.results
     rows = (tmp_path / "drives.csv").read_text().splitlines()
     assert len(rows) == 1 + len(evaluation.played) * len(SEEDS)
-    # A scheduler of another environment: its network would read other numbers as its features.
-    told = scheduler.provenance.model_copy(update={"feature_names": ("heat_margin",)})
-    other = NetworkPolicy(score_network((1, 3), "tanh"), told)
     with pytest.raises(ValueError, match="other features"):
-        evaluate_scheduler(config, other)
+        evaluate_scheduler(config, scheduler_of(None, ("heat_margin",)))
+
+
+@pytest.mark.parametrize(
+    ("trained", "says"),
+    [
+        ((0.001, 0.4), ""),
+        ((0.001, 0.1), "prices 0.3 are not played: the scheduler was trained with 0.001 to 0.1\n"),
+        ((0.005, 0.005), "trained at one price, 0.005: its front is one point\n"),
+        ((0.1, 0.4), "reward.power is 0.005 to 0.005, outside of 0.1 to 0.4, which"),
+        (None, ""),
+    ],
+)
+def test_prices_outside_of_the_training_are_named(config, capsys, trained, says):
+    check_study(config, scheduler_of(trained))
+    told = capsys.readouterr().err
+    assert says in told and bool(told) == bool(says)
+
+
+def test_a_scheduler_that_knows_none_of_the_prices_is_refused(config):
+    with pytest.raises(ValueError, match=r"prices is 0.005, 0.3; expected at least one from 0.4"):
+        check_study(config, scheduler_of((0.4, 0.5)))

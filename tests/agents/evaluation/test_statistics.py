@@ -2,7 +2,14 @@ import numpy as np
 import pytest
 
 from agents.config.study_config import StudyConfig
-from agents.evaluation.statistics import Interval, excess, interval, ratio, resampled
+from agents.evaluation.statistics import (
+    Interval,
+    excess,
+    interval,
+    ratio,
+    resampled,
+    resampled_each,
+)
 
 mean = np.mean
 
@@ -83,3 +90,16 @@ def test_resampled_agrees_with_the_interval_of_a_plain_mean():
     assert found.value == pytest.approx(values.mean())
     assert found.low == pytest.approx(usual.low, abs=0.05)
     assert found.high == pytest.approx(usual.high, abs=0.05)
+
+
+def test_statistics_of_one_call_share_their_resamples():
+    values = np.random.default_rng(3).normal(2.0, 1.0, 20)
+
+    def statistics(weight):
+        mean = float(weight @ values / weight.sum())
+        return {"mean": mean, "more": mean + 1.0, "difference": (mean + 1.0) - mean}
+
+    found = resampled_each(statistics, 20, StudyConfig(bootstrap_draws=500))
+    assert found["difference"] == Interval(*[pytest.approx(1.0)] * 3)
+    assert found["more"].low == pytest.approx(found["mean"].low + 1.0)
+    assert found["mean"].low < found["mean"].value < found["mean"].high

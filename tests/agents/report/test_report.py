@@ -3,8 +3,10 @@ import re
 
 import numpy as np
 import pytest
-from report_sample import made_up_results, made_up_strip, made_up_timeline
+from report_sample import RULES, made_up_results, made_up_strip, made_up_timeline
 
+from agents.report.answer import details, verdict
+from agents.report.charts import prices_apart, undominated
 from agents.report.page import REPORT, render_page, write_report
 from agents.report.results import (
     FRAMES,
@@ -12,8 +14,6 @@ from agents.report.results import (
     TIMELINE,
     label,
     read_strip,
-    rival_note,
-    verdict,
     write_strip,
 )
 from shotenv.config.families import FAMILIES
@@ -37,6 +37,14 @@ def page():
     return render_page(made_up_results(), made_up_timeline(), made_up_strip())
 
 
+def text_of_table(page, body):
+    return re.search(rf'<tbody class="{body}">.*?</tbody>', page, flags=re.DOTALL).group()
+
+
+def named_in(page, body):
+    return re.findall(r"<tr[^>]*>\s*<td>([^<]*)", text_of_table(page, body))
+
+
 def write_sample(folder):
     write_json(folder / RESULTS, made_up_results())
     write_json(folder / TIMELINE, made_up_timeline())
@@ -44,25 +52,72 @@ def write_sample(folder):
 
 
 @pytest.mark.parametrize(
-    ("difference", "says"),
+    ("better", "begins", "holds"),
     [
-        ((6.0, 2.0, 9.0), "beats the best fixed choice, always 4 DCS, by 6.0"),
-        ((-6.0, -9.0, -2.0), "does worse than the best fixed choice, always 4 DCS, by 6.0"),
-        ((1.0, -2.0, 3.0), "No significant difference"),
-        ((1.0, 0.0, 3.0), "includes zero"),
+        # A quarter of `better` is saved, give or take 5 %.
+        (0.8, "At the depth error of always 8 DCS (0.32 m) the scheduler saves 20 %", "15 to 25 %"),
+        (0.8, "At", "its laser lives 1.8 times as long (1.7 to 1.9) and is 4.0 K cooler"),
+        (0.0, "No significant difference: at the depth error of always 8 DCS", "saves 0 %"),
+        (0.2, "No significant difference", "0 to 10 %"),
     ],
 )
-def test_verdict_says_what_the_interval_says(difference, says):
-    sentence = verdict(made_up_results(difference))
-    assert says in sentence and sentence.count(". ") == 0 and sentence.endswith(".")
+def test_verdict_says_what_the_interval_says(better, begins, holds):
+    sentence = verdict(made_up_results(better=better))
+    assert sentence.startswith(begins) and holds in sentence
+    assert sentence.count(". ") == 0 and sentence.endswith(" over 24 test drives.") == (
+        begins.startswith("No")
+    )
 
 
-def test_strongest_rival_is_named_with_its_interval():
+@pytest.mark.parametrize(
+    ("better", "says"),
+    [
+        (
+            0.9,
+            "Against the best of the tuned rules, look and hold, at half the energy its error is "
+            "0.20 m less (95 % interval 0.15 to 0.25)",
+        ),
+        (0.3, "0.10 m more (95 % interval 0.05 to 0.15)"),
+        (0.54, "No significant difference to the best of the tuned rules, look and hold"),
+    ],
+)
+def test_the_best_rule_is_named_with_its_interval(better, says):
+    assert says in " ".join(details(made_up_results(better=better)))
+
+
+def test_a_scheduler_of_one_price_is_said_to_have_no_knob():
+    one, range_of = (
+        " ".join(details(made_up_results(prices=prices))) for prices in ((0.09,), (0.01, 0.1))
+    )
+    assert "trained at one price, 0.09, and has no knob" in one and "no knob" not in range_of
+
+
+def test_without_rules_and_optimum_the_rest_is_told():
     results = made_up_results()
-    assert "cycle, its return is +0.4" in rival_note(results)
-    assert "-0.2 to +1.1, which includes zero" in rival_note(results)
-    results["paired_to_best_rival"] = {"difference": 0.4, "low": 0.1, "high": 1.1}
-    assert "zero" not in rival_note(results)
+    for name in (*RULES, "optimum"):
+        del results["answer"]["measures"][name]
+        del results["fronts"][name]
+    for one in results["answer"]["measures"].values():
+        del one["gap_closed"]
+    told = " ".join(details(results))
+    assert "rules" not in told and "gap" not in told and "At half the laser energy" in told
+    assert "Optimum" not in text_of_table(
+        render_page(results, made_up_timeline(), made_up_strip()), "fronts"
+    )
+
+
+def test_prices_that_would_cover_each_other_are_left_out():
+    rows = [
+        {"price": price, "laser_energy_share": share}
+        for price, share in ((0.3, 0.3), (0.2, 0.31), (0.1, 0.5), (0.05, 0.52), (0.01, 0.6))
+    ]
+    assert prices_apart(rows) == ["0.3", "", "0.1", "", "0.01"]
+
+
+def test_a_front_is_drawn_along_points_that_no_other_beats():
+    errors = [1.0, 1.2, 0.5, 0.5, 0.4]
+    rows = [{"depth_mae_m": error} for error in errors]
+    assert [row["depth_mae_m"] for row in undominated(rows)] == [1.0, 0.5, 0.4]
 
 
 def test_page_is_self_contained(page):
@@ -75,12 +130,17 @@ def test_page_is_self_contained(page):
 
 
 def test_page_shows_every_policy_and_family(page):
-    table = re.search(r"<tbody>.*?</tbody>", page, flags=re.DOTALL).group()
-    named = re.findall(r"<tr[^>]*>\s*<td>([^<]*)", table)
-    assert sorted(named) == sorted(label(name) for name in made_up_results()["policies"])
+    policies = sorted(label(name) for name in made_up_results()["policies"])
+    assert sorted(named_in(page, "policies")) == sorted(named_in(page, "tails")) == policies
+    expected = ["Scheduler", "Look and hold", "SNR threshold rule"]
+    expected += ["Best mixture of fixed choices", "Optimum, knows all"]
+    assert named_in(page, "fronts") == expected
+    assert named_in(page, "knob") == ["0.01", "0.1"]
     for family in FAMILIES:
         assert f'data-family="{family}"' in page
-    assert verdict(made_up_results()) in page and rival_note(made_up_results()) in page
+    plain = page.replace("\u00a0", " ")
+    for sentence in (verdict(made_up_results()), *details(made_up_results())):
+        assert sentence in plain
 
 
 def test_page_holds_five_pictures_of_each_frame(page):
@@ -108,6 +168,7 @@ def test_names_are_escaped():
     results["policies"]["<script>x"] = results["policies"]["random"]
     results["paired_to_best_fixed"]["<script>x"] = results["paired_to_best_fixed"]["random"]
     table = render_page(results, made_up_timeline(), made_up_strip())
+    assert "<rule>" not in table
     assert "<td><script>x" not in table and "&lt;script&gt;x" in table
 
 
