@@ -160,7 +160,8 @@ class _Judge(BaseCallback):
 
     def _on_training_end(self) -> None:
         # The last steps may not have filled an interval.
-        self._judge()
+        if self.num_timesteps > self._next - self._interval:
+            self._judge()
 
     def _judge(self) -> None:
         self._state = self._learner.judged(self._state, self.num_timesteps)

@@ -9,10 +9,12 @@ from safetensors.torch import load_file
 
 from agents.cli.doctor import Finding
 from agents.cli.entry import COMMANDS, main
+from agents.policies.learned import load_policy
 from agents.report.results import FRAMES, RESULTS, TIMELINE, write_strip
 from agents.training.branching import Branches
 from agents.training.checkpoint import CHECKPOINT
 from shotenv.config.families import FAMILIES
+from shotenv.config.reader import configs_dir
 from unwrap.support.files import write_json
 
 
@@ -95,6 +97,25 @@ def test_an_interrupted_training_of_the_command_line_goes_on(capsys, monkeypatch
         assert run(capsys, *words, "--out", tmp_path / name)[0] == 0
     one, two = (load_file(tmp_path / name / CHECKPOINT) for name in ("parts", "whole"))
     assert one.keys() == two.keys() and all(torch.equal(one[key], two[key]) for key in one)
+
+
+SHORT = {
+    "dqn": "--agent.dqn.total_steps 64 --agent.dqn.num_envs 2 --agent.dqn.learning_starts 16",
+    "qrdqn": "--agent.dqn.total_steps 64 --agent.dqn.num_envs 2 --agent.dqn.learning_starts 16",
+    "regression": "--agent.regression.rounds 1 --agent.regression.drives 2"
+    " --agent.regression.validation_drives 2 --agent.regression.passes 1",
+}
+
+
+@pytest.mark.parametrize("algorithm", SHORT)
+def test_every_learner_trains_by_the_same_command(capsys, tmp_path, tiny, algorithm):
+    small = f"{SHORT[algorithm]} --env.frames_per_drive 16 --study.tuning_drives 2"
+    file = configs_dir() / "agent" / f"{algorithm}.yaml"
+    words = ("train", "--agent", file, *small.split(), *tiny, "--out", tmp_path)
+    status, out, err = run(capsys, *words)
+    assert status == 0 and f"shotenv evaluate {tmp_path}" in out, err
+    told = load_policy(tmp_path).provenance
+    assert told.algorithm == algorithm and told.power_price == (0.01, 0.35)
 
 
 def test_a_group_lists_its_commands(capsys):

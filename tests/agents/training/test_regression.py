@@ -10,13 +10,11 @@ from agents.evaluation.play import FIXED_POLICIES, make_envs, play_drives
 from agents.policies.fixed import FixedPolicy
 from agents.policies.learned import load_policy
 from agents.policies.score_networks import widths_of
-from agents.training.branching import Branches
 from agents.training.checkpoint import CHECKPOINT
 from agents.training.fitting import Frames, fit, regret
 from agents.training.regression import RegressionTrainer, Straying
 from agents.training.scheduler import branches_of, priced, validation_prices
 from shotenv.config.keywords import env_config
-from shotenv.decision.features import FEATURE_NAMES
 
 PRICE = (0.01, 0.35)
 SMALL = AgentConfig(
@@ -184,7 +182,3 @@ def test_one_scheduler_beats_every_fixed_choice_at_every_price(tmp_path):
         ]
         learnt = play_drives(policy, envs, seeds, price=price).reward.sum(axis=1).mean()
         assert learnt > max(fixed), f"price {price}: {learnt:.1f}, fixed {fixed}"
-
-
-def test_branches_tell_their_features(drives):
-    assert isinstance(drives[0], Branches) and drives[0].feature_names == FEATURE_NAMES
