@@ -37,7 +37,7 @@ from agents.policies import (
     RandomPolicy,
 )
 from shotenv.config import EnvConfig
-from shotenv.decision import FEATURE_NAMES, open_problem
+from shotenv.decision import FEATURE_NAMES, Problem, open_problem
 from unwrap.signal import Shots
 from unwrap.support import progress, say
 
@@ -152,11 +152,11 @@ def evaluate_scheduler(config: DemoConfig, scheduler: NetworkPolicy) -> Evaluati
     """
     study = config.study
     check_study(config, scheduler)
+    warn_of_prices(config, scheduler)
     tuned = tune_families(config)
-    seeds = drive_seeds(study, study.drives)
     # The same environments for all, which remember what they measured: noise depends on drive and
     # frame alone, so that policies that take the same shots of a frame share its cost.
-    envs = make_envs(config.env, study.split, len(seeds), "Disabled")
+    envs = make_envs(config.env, study.split, study.drives, "Disabled")
     rules = {name: found[price_of(config.env)].policy for name, found in tuned.items()}
     policies = {
         SCHEDULER: scheduler,
@@ -166,39 +166,50 @@ def evaluate_scheduler(config: DemoConfig, scheduler: NetworkPolicy) -> Evaluati
     }
     played = play_all(policies, envs, study)
     fronts = play_fronts(scheduler, tuned, envs, config)
-
     problem = open_problem(config.env.model_copy(update={"split": study.split}))
-    frames = len(seeds) * config.env.frames_per_drive
-    with progress(frames, f"every action on {study.split} drives", "frame") as bar:
-        possible = tabulate(problem, seeds, tick=bar.update)
-    # What a derated laser would measure depends on the choices before: no table tells.
-    optimum = None if config.env.laser.derate_per_k else optimum_front(possible, study.prices)
-    cool_eight_m = by_clip(possible.table().depth_mae_m[..., Shots.EIGHT.action], possible.clips())
+    optimum, cool_eight_m = table_fronts(problem, study)
 
     results = summary(played, study, scheduler=SCHEDULER, drive_s=drive_s(config.env))
     for name, rule in rules.items():
         results["policies"][name]["rule"] = str(rule)
-    families = {name: front for name, front in fronts.items() if name != BLIND}
+    blind = fronts.pop(BLIND)
     results["answer"] = {
         "scheduler": SCHEDULER,
         "prices": list(fronts[SCHEDULER].prices),
-        **compare_fronts(
-            families, fronts[BLIND], optimum, cool_eight_m, study, scheduler=SCHEDULER
-        ),
+        **compare_fronts(fronts, blind, optimum, cool_eight_m, study, scheduler=SCHEDULER),
     }
-    results["fronts"] = {
-        name: front.rows
-        for name, front in {**fronts, **({OPTIMUM: optimum} if optimum else {})}.items()
-    }
+    shown = {**fronts, BLIND: blind} | ({OPTIMUM: optimum} if optimum else {})
+    results["fronts"] = {name: front.rows for name, front in shown.items()}
+    results["algorithm"] = scheduler.provenance.algorithm
     # Every how many pixels each way: only of all of them there are images.
     results["every"] = problem.bank.every
-    results["algorithm"] = scheduler.provenance.algorithm
     results["config"] = config.model_dump(mode="json")
     return Evaluation(results, played)
 
 
+def table_fronts(problem: Problem, study: StudyConfig) -> tuple[PlayedFront | None, np.ndarray]:
+    """From the outcomes of every action: the optimum, and the error of 8 DCS without heat.
+
+    Returns
+    -------
+    optimum : PlayedFront or None
+        None with a derated laser: what it would measure depends on the choices before, which no
+        table tells.
+    cool_eight_m : float64 [C]
+        Sum over the frames of each clip of the error of 8 DCS with a laser that never trips.
+    """
+    seeds = drive_seeds(study, study.drives)
+    frames = len(seeds) * problem.config.frames_per_drive
+    with progress(frames, f"every action on {study.split} drives", "frame") as bar:
+        possible = tabulate(problem, seeds, tick=bar.update)
+    eight_m = possible.table().depth_mae_m[..., Shots.EIGHT.action]
+    derated = problem.config.laser.derate_per_k > 0
+    optimum = None if derated else optimum_front(possible, study.prices)
+    return optimum, by_clip(eight_m, possible.clips())
+
+
 def check_study(config: DemoConfig, scheduler: NetworkPolicy) -> None:
-    """Refuse what cannot be judged, and say what will not be, before anything is played.
+    """Refuse what cannot be judged, before anything is played.
 
     Raises
     ------
@@ -211,18 +222,22 @@ def check_study(config: DemoConfig, scheduler: NetworkPolicy) -> None:
             "the scheduler was trained on other features than this environment has; "
             "train it again (`shotenv train`)"
         )
-    own, trained = prices_of(scheduler, config.study.prices), scheduler.provenance.power_price
-    if trained is None:
+    prices_of(scheduler, config.study.prices)
+
+
+def warn_of_prices(config: DemoConfig, scheduler: NetworkPolicy) -> None:
+    """Say which prices the scheduler was not trained for, and that it has no knob."""
+    if scheduler.provenance.power_price is None:
         return
-    low, high = trained
+    low, high = scheduler.provenance.power_price
     left = [price for price in config.study.prices if not low <= price <= high]
-    if left and low < high:
+    if low == high:
+        say(f"the scheduler was trained at one price, {low:g}: its front is one point")
+    elif left:
         say(
-            f"prices {', '.join(f'{price:g}' for price in left)} are not played: the scheduler was "
+            f"not played: prices {', '.join(f'{price:g}' for price in left)}; the scheduler was "
             f"trained with {low:g} to {high:g}"
         )
-    elif len(own) == 1:
-        say(f"the scheduler was trained at one price, {own[0]:g}: its front is one point")
     least, most = config.env.reward.power
     if least < low or most > high:
         say(
