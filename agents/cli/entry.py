@@ -21,6 +21,7 @@ from agents.cli import (
     play_command,
     problem_command,
     schedule_commands,
+    study_command,
     unwrap_commands,
 )
 from agents.cli.command import DONE, FAILED, INTERRUPTED, WRONG_USAGE, Command
@@ -30,6 +31,7 @@ HELP = ("--help", "-h", "help")
 COMMANDS: tuple[Command, ...] = (
     *doctor_command.COMMANDS,
     *schedule_commands.COMMANDS,
+    *study_command.COMMANDS,
     *problem_command.COMMANDS,
     *play_command.COMMANDS,
     *collect_command.COMMANDS,
