@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from typing import Annotated
+
+from pydantic import Field, StringConstraints
 
 from agents.config.study_config import StudyConfig
 from unwrap.support import Section
+
+RowName = Annotated[str, StringConstraints(pattern=r"^[a-z0-9_]+$")]
+"""It is that of files, too."""
 
 
 class AblationConfig(Section):
@@ -36,7 +41,7 @@ class StudyPlan(Section):
         min_length=1, description="names in configs/env, or YAML files"
     )
     seeds: tuple[int, ...] = Field(min_length=1, description="seeds of the training")
-    ablations: dict[str, AblationConfig] = Field(
+    ablations: dict[RowName, AblationConfig] = Field(
         default_factory=dict, description="learners that are not shown all features"
     )
     study: StudyConfig = StudyConfig()

@@ -1,4 +1,4 @@
-"""Policies x presets x training seeds, played as independent jobs, and the table they make."""
+"""Policies x presets x seeds as jobs, and their table."""
 
 import lazy_loader
 

@@ -104,7 +104,7 @@ def read_result(stem: Path) -> JobResult:
     told = _described(stem.with_suffix(".json"))
     path = stem.with_suffix(".npz")
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         fronts = {
             name: PlayedFront(

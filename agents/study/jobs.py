@@ -81,8 +81,8 @@ def jobs_of(plan: StudyPlan) -> list[Job]:
     ablations = [_ablation(row, one, envs) for row, one in plan.ablations.items()]
     policies = _named("policies", plan.policies, _policy)
     for row in plan.ablations:
-        if row in policies:
-            raise ConfigError(f"ablations has {row!r}, which is a policy, too")
+        if row in policies or row == REFERENCES:
+            raise ConfigError(f"ablations has {row!r}, which is taken; expected another name")
     jobs: list[Job] = []
     for preset, env in envs.items():
         jobs += _of_preset(plan, preset, env, policies)

@@ -28,6 +28,7 @@ MEASURES: Final[tuple[str, ...]] = ("gap_closed", "error_at_half_energy", "energ
 """See `agents.evaluation.compare_fronts`. There is no gap without an optimum."""
 RETURN: Final = "return"
 """Of a drive at the preset's price of power."""
+ROUNDING: Final = 1e-9
 RANKED_BY: Final = "error_at_half_energy"
 
 
@@ -152,4 +153,5 @@ def _improvements(
 
 def is_significant(probability: Interval) -> bool:
     """Whether the interval of a probability of improvement leaves out even chances."""
-    return not probability.low <= 0.5 <= probability.high
+    # Sums of halves are rounded.
+    return not probability.low - ROUNDING <= 0.5 <= probability.high + ROUNDING
