@@ -21,7 +21,6 @@ from agents.cli import (
     play_command,
     problem_command,
     schedule_commands,
-    study_command,
     unwrap_commands,
 )
 from agents.cli.command import DONE, FAILED, INTERRUPTED, WRONG_USAGE, Command
@@ -31,7 +30,6 @@ HELP = ("--help", "-h", "help")
 COMMANDS: tuple[Command, ...] = (
     *doctor_command.COMMANDS,
     *schedule_commands.COMMANDS,
-    *study_command.COMMANDS,
     *problem_command.COMMANDS,
     *play_command.COMMANDS,
     *collect_command.COMMANDS,
