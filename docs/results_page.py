@@ -35,7 +35,7 @@ SHOWN: Final = {
 def interval(row: dict[str, Any], measure: str, form: str) -> str:
     """Interquartile mean and interval; a dash where there is none."""
     if measure not in row:
-        return "–"
+        return "-"
     scale, digits = {"%": (100, 0), "m": (1, 2), "": (1, 0)}[form]
     mean, low, high = (scale * row[measure][key] for key in ("iqm", "low", "high"))
     return f"{mean:.{digits}f} {form} ({low:.{digits}f} to {high:.{digits}f})".replace("  ", " ")
