@@ -24,7 +24,7 @@ class StudyConfig(Section):
     seed: int = Field(1000, ge=0, description="seed of the first drive")
     # About geometric: from where nearly all that helps is taken to where 2 DCS nearly always are.
     prices: Annotated[tuple[NonNegative, ...], AfterValidator(_rising)] = Field(
-        (0.002, 0.005, 0.01, 0.02, 0.04, 0.06, 0.09, 0.13, 0.2, 0.35),
+        (0.01, 0.02, 0.04, 0.06, 0.09, 0.13, 0.2, 0.35),
         min_length=1,
         description="prices of power at which fronts are played",
     )
