@@ -34,7 +34,7 @@ class JobResult:
     fronts : mapping of str to PlayedFront
         By what they are: "front" of a policy; "blind" and "optimum" of the references.
     seconds : float
-        What it took, training and all.
+        Of one core that it took, training and all; of a training that was resumed, the rest alone.
     arrays : mapping of str to float64 [C]
         Other sums of each clip.
     """

@@ -87,7 +87,7 @@ def bank_of(config: EnvConfig) -> str:
 
 def run_job(job: Job, folder: Path, depends_on: dict[str, Any]) -> None:
     """Run one job; its bars and lines go to a file beside its result."""
-    began, stem = time.perf_counter(), folder / job.name
+    began, stem = time.process_time(), folder / job.name
     stem.parent.mkdir(parents=True, exist_ok=True)
     with (
         stem.with_suffix(".log").open("w", encoding="utf-8") as log,
@@ -103,7 +103,7 @@ def run_job(job: Job, folder: Path, depends_on: dict[str, Any]) -> None:
             fronts |= {"optimum": optimum} if optimum else {}
         else:
             fronts = {"front": front_of_job(job, stem)}
-    write_result(stem, JobResult(fronts, time.perf_counter() - began, arrays), depends_on)
+    write_result(stem, JobResult(fronts, time.process_time() - began, arrays), depends_on)
 
 
 def front_of_job(job: Job, stem: Path) -> PlayedFront:
