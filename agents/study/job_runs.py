@@ -69,7 +69,7 @@ def run_jobs(jobs: Sequence[Job], folder: Path, *, workers: int) -> None:
         except KeyboardInterrupt:
             for process in multiprocessing.active_children():
                 process.terminate()
-            pool.shutdown(wait=False, cancel_futures=True)
+            pool.shutdown(cancel_futures=True)
             kept = sum(folder.joinpath(f"{job.name}.json").is_file() for job in jobs)
             raise KeyboardInterrupt(
                 f"{kept} of {len(jobs)} jobs are kept; the same command continues"
