@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,8 @@ from agents.cli.experiment import (
     prepare_bank,
 )
 from agents.config import DemoConfig
-from unwrap.support import say
+from shotenv.config import ConfigError, read_config
+from unwrap.support import say, write_json
 
 if TYPE_CHECKING:
     from agents.evaluation import Evaluation
@@ -109,6 +111,36 @@ def report(arguments: Namespace) -> int:
     return DONE
 
 
+def study_arguments(parser: ArgumentParser) -> None:
+    """Which study, how many at a time, and where its results go."""
+    parser.add_argument("file", type=Path, help="YAML file, such as configs/study/results.yaml")
+    parser.add_argument(
+        "--workers", type=int, default=os.cpu_count() or 1, help="processes, one thread each"
+    )
+    add_out(parser, "runs/study", "folder of the results of each job, and of results.json")
+
+
+def run_study(arguments: Namespace) -> int:
+    """Run the jobs that do not stand yet, and measure what they played."""
+    from agents.config import StudyPlan
+    from agents.study import jobs_of, make_leaderboard, run_jobs
+
+    if arguments.workers < 1:
+        raise ConfigError(f"workers is {arguments.workers}; expected at least 1")
+    plan = read_config(StudyPlan, arguments.file)
+    jobs = jobs_of(plan)
+    run_jobs(jobs, arguments.out, workers=arguments.workers)
+    found = make_leaderboard(plan, jobs, arguments.out)
+    write_json(arguments.out / "results.json", found)
+    for preset, table in found["presets"].items():
+        print(f"\n{preset}: {table['best']} errs least at half the energy")
+        for name, row in table["rows"].items():
+            at_half, rewarded = row["error_at_half_energy"], row["return"]
+            print(f"  {name:22}{at_half['iqm']:6.2f} m  return {rewarded['iqm']:8.1f}")
+    print(f"\nNumbers: {arguments.out / 'results.json'}")
+    return DONE
+
+
 COMMANDS = (
     Command(
         "demo",
@@ -129,6 +161,13 @@ COMMANDS = (
         "compare a trained scheduler with baselines, write a report",
         evaluate_arguments,
         evaluate,
+    ),
+    Command(
+        "study",
+        "play policies x presets x training seeds, job by job, and rank them",
+        study_arguments,
+        run_study,
+        resumes=True,
     ),
     Command("report", "write the report of an evaluation anew", report_arguments, report),
 )

@@ -6,3 +6,4 @@ from .agent import (
 )
 from .demo import DemoConfig as DemoConfig
 from .study_config import StudyConfig as StudyConfig
+from .study_plan import AblationConfig as AblationConfig, StudyPlan as StudyPlan

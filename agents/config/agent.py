@@ -72,6 +72,9 @@ class RegressionConfig(Section):
     noise: NonNegative = Field(
         0.3, description="noise on features of the scene in training, in their standard deviations"
     )
+    unseen: tuple[str, ...] = Field(
+        (), description="features that the learner is not shown: what they are worth to it"
+    )
 
 
 class AgentConfig(Section):
@@ -84,7 +87,10 @@ class AgentConfig(Section):
     """
 
     algorithm: Algorithm = Field("ppo", description="which learner")
-    hidden: tuple[int, ...] = Field((64, 64), description="hidden layers of each network")
+    hidden: tuple[int, ...] = Field(
+        (64, 64),
+        description="hidden layers of each network; none: a linear ridge, regression alone",
+    )
     power_price: Range | None = Field(
         (0.01, 0.35),
         description="range of the price of power that drives are trained with, drawn "

@@ -1,4 +1,4 @@
-"""Policies played on the same drives, compared in pairs; how much there is to win."""
+"""Policies played on the same drives, compared in pairs; what there is to win."""
 
 import lazy_loader
 

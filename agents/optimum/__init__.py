@@ -1,4 +1,4 @@
-"""What any policy could reach: tables of every outcome, choices played on them, the optimum."""
+"""What any policy could reach: outcomes of every action, the optimum."""
 
 import lazy_loader
 

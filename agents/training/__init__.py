@@ -1,4 +1,4 @@
-"""Training of schedulers, and stable-baselines3's view of the environment."""
+"""Training of schedulers, and stable-baselines3's view of drives."""
 
 import lazy_loader
 

@@ -2,7 +2,8 @@
 
 The data are few clips, which networks learn by heart within a few passes. So each sees the frame
 with noise, is judged after every pass on frames of other clips, and is kept as it was then at its
-best; and scores are the mean over several networks.
+best; and scores are the mean over several networks. Without hidden layers it is a ridge regression
+(Hoerl and Kennard, Technometrics 12, 1970), which is solved: what networks have to beat.
 """
 
 from __future__ import annotations
@@ -16,12 +17,14 @@ import torch
 from torch import Tensor, nn
 
 from agents.config import AgentConfig
-from agents.policies import mean_network, rescaled_network, score_network
-from shotenv.decision import SCENE_FEATURES, SEEN_FEATURES
+from agents.policies import linear_layers, mean_network, rescaled_network, score_network
+from shotenv.decision import FEATURE_NAMES, SCENE_FEATURES, SEEN_FEATURES, feature_index
 
 SHOWN: Final = len(SCENE_FEATURES) + len(SEEN_FEATURES)
 """Features at the front of the observation that tell the scene, by which a clip is known again; the
 others tell the state of the drive, such as the price, and are given as they are."""
+PENALTIES: Final = (1e-4, 1e-3, 1e-2, 1e-1, 1.0)
+"""Of a ridge regression's weights, of features and targets with variance 1 (assumed)."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,8 @@ def fit(training: Frames, judging: Frames, config: AgentConfig, *, seed: int) ->
     training : Frames
         What the members are fitted to.
     judging : Frames
-        Frames of other clips, which choose the pass after which each member is kept.
+        Frames of other clips, which choose the pass after which each member is kept, or the penalty
+        of a ridge regression.
     """
     seen = training.observations
     # Where a feature hardly differs in training, other drives must not be blown up.
@@ -78,12 +82,35 @@ def fit(training: Frames, judging: Frames, config: AgentConfig, *, seed: int) ->
     worth = training.worth - training.worth.mean(dim=1, keepdim=True)
     scale = float(worth.std().clamp(min=1e-9))
     shown, target = (seen - mean) / spread, worth / scale
+    # At its mean a feature tells nothing, and its weights stay 0: nor does it in play.
+    unseen = [feature_index(FEATURE_NAMES, name) for name in config.regression.unseen]
+    shown[:, unseen] = 0.0
     judged = Frames((judging.observations - mean) / spread, judging.worth)
+    if not config.hidden:
+        return rescaled_network(_ridge(shown, target, judged), mean, spread, scale)
     members = [
         _member(shown, target, judged, config, seed=seed * config.regression.members + number)
         for number in range(config.regression.members)
     ]
     return rescaled_network(mean_network(members), mean, spread, scale)
+
+
+def _ridge(shown: Tensor, target: Tensor, judged: Frames) -> nn.Sequential:
+    """The linear scores whose penalty loses least on the judging frames."""
+    features, wanted = shown.double(), target.double()
+    # Features have mean 0, so that the intercept is the mean of the targets, and not penalised.
+    gram, moment = (features.T @ each / len(features) for each in (features, wanted))
+    found = []
+    for penalty in PENALTIES:
+        eye = torch.eye(len(gram), dtype=gram.dtype)
+        weight = torch.linalg.solve(gram + penalty * eye, moment)
+        network = score_network(weight.shape, "tanh")
+        layer = linear_layers(network)[0]
+        with torch.no_grad():
+            layer.weight.copy_(weight.T)
+            layer.bias.copy_(wanted.mean(dim=0))
+        found.append(network)
+    return min(found, key=lambda network: regret(network, judged))
 
 
 def _member(
@@ -93,6 +120,9 @@ def _member(
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         network = score_network((shown.shape[1], *config.hidden, target.shape[1]), "tanh")
+    unseen = [feature_index(FEATURE_NAMES, name) for name in learner.unseen]
+    with torch.no_grad():
+        linear_layers(network)[0].weight[:, unseen] = 0.0
     generator = torch.Generator().manual_seed(seed)
     optimizer = torch.optim.AdamW(
         network.parameters(), learner.learning_rate, weight_decay=learner.weight_decay
@@ -107,6 +137,7 @@ def _member(
             noisy[:, :SHOWN] += learner.noise * torch.randn(
                 noisy[:, :SHOWN].shape, generator=generator
             )
+            noisy[:, unseen] = 0.0
             scores = network(noisy)
             loss = nn.functional.mse_loss(scores, target[rows])
             optimizer.zero_grad()

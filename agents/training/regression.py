@@ -34,6 +34,7 @@ from agents.training.branching import Branches, Path as Played
 from agents.training.checkpoint import Checkpoint, Validate
 from agents.training.fitting import Frames, fit
 from agents.training.scalars import Scalars
+from shotenv.decision import feature_index
 from unwrap.support import Range, progress
 
 LEAST_RANDOM: Final = 0.02
@@ -58,7 +59,8 @@ class RegressionTrainer:
     Raises
     ------
     ValueError
-        `out` holds the checkpoint of another configuration, or a damaged one.
+        `out` holds the checkpoint of another configuration, or a damaged one; or `unseen` has a
+        feature that there is none of.
     """
 
     def __init__(
@@ -72,6 +74,8 @@ class RegressionTrainer:
     ) -> None:
         self._drives = training, judging
         self._power_price, self._config = power_price, config
+        for name in config.regression.unseen:
+            feature_index(training.feature_names, name)  # refuses what there is none of
         self._validate, self._out = validate, out
         self._provenance = Provenance(
             algorithm="regression",
@@ -164,6 +168,7 @@ class RegressionTrainer:
 
     def _restore(self, tensors: dict[str, torch.Tensor]) -> None:
         config, features = self._config, len(self._provenance.feature_names)
+        # A ridge regression has none.
         hidden = [config.regression.members * width for width in config.hidden]
         rounds = 1 + max(int(name.split(".", 1)[0]) for name in tensors)
         for number in range(rounds):

@@ -102,6 +102,12 @@ room("agents.optimum", *SIGNAL, *ENVIRONMENT, "agents.policies")
 PLAYING = (*SIGNAL, *ENVIRONMENT, "agents.config", "agents.policies", "agents.optimum")
 room("agents.evaluation", *PLAYING)
 room("agents.training", *PLAYING, "agents.evaluation")
+room(
+    "agents.study",
+    *PLAYING,
+    "agents.evaluation",
+    "agents.training",
+)
 room("agents.report", *PLAYING, "unwrap.pictures", "agents.evaluation")
 room("agents.deploy", *SIGNAL, "agents.policies")
 room("agents", "agents.policies", "agents.evaluation", "agents.training")

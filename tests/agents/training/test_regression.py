@@ -15,6 +15,7 @@ from agents.training.fitting import Frames, fit, regret
 from agents.training.regression import RegressionTrainer, Straying
 from agents.training.scheduler import branches_of, priced, validation_prices
 from shotenv.config.keywords import env_config
+from shotenv.decision.features import FEATURE_NAMES
 
 PRICE = (0.01, 0.35)
 SMALL = AgentConfig(
@@ -42,6 +43,47 @@ def test_regret_is_what_the_chosen_actions_lack():
         with torch.no_grad():
             network.bias.copy_(torch.eye(3)[action])
         assert regret(network, frames) == pytest.approx(lost)
+
+
+def known_frames(count, seed):
+    """Frames of all features, of which the first two say in a line what each action is worth."""
+    generator = torch.Generator().manual_seed(seed)
+    observations = torch.randn(count, len(FEATURE_NAMES), generator=generator)
+    weight = torch.tensor([[1.0, 0.0, -1.0], [0.0, 2.0, -2.0]])
+    return Frames(observations, observations[:, :2] @ weight + torch.tensor([0.3, -0.3, 0.0]))
+
+
+def test_without_hidden_layers_the_fit_is_a_ridge_regression():
+    training, judging = known_frames(4096, 0), known_frames(512, 1)
+    network = fit(training, judging, SMALL.model_copy(update={"hidden": ()}), seed=0)
+    assert widths_of(network) == (len(FEATURE_NAMES), 3)
+    with torch.no_grad():
+        scores, worth = network(judging.observations), judging.worth
+    torch.testing.assert_close(scores, worth - worth.mean(1, keepdim=True), atol=0.02, rtol=0.0)
+    assert regret(network, judging) < 0.001
+
+
+@pytest.mark.parametrize("hidden", [(), (8,)])
+def test_what_is_not_shown_changes_no_score(hidden):
+    training, judging = known_frames(1024, 0), known_frames(256, 1)
+    names = FEATURE_NAMES[1], FEATURE_NAMES[30]
+    learner = SMALL.regression.model_copy(update={"unseen": names, "passes": 2})
+    config = SMALL.model_copy(update={"hidden": hidden, "regression": learner})
+    network = fit(training, judging, config, seed=0)
+    seen, changed = judging.observations, judging.observations.clone()
+    changed[:, [1, 30]] += 5.0
+    with torch.no_grad():
+        assert torch.equal(network(seen), network(changed))
+        changed[:, 0] += 5.0
+        assert not torch.equal(network(seen), network(changed))
+
+
+def test_features_that_there_are_none_of_are_refused(tiny_kwargs, tmp_path):
+    drives = branches_of(env_config(**tiny_kwargs), "train", [0])
+    learner = SMALL.regression.model_copy(update={"unseen": ("mood",)})
+    config = SMALL.model_copy(update={"regression": learner})
+    with pytest.raises(ValueError, match="feature_names has no 'mood'"):
+        RegressionTrainer(drives, drives, PRICE, config, lambda policy: 0.0, tmp_path)
 
 
 def test_a_fit_tells_what_actions_are_worth_beside_each_other():

@@ -1,0 +1,3 @@
+from .job_runs import run_jobs as run_jobs
+from .jobs import Job as Job, jobs_of as jobs_of
+from .leaderboard import make_leaderboard as make_leaderboard

@@ -1,0 +1,150 @@
+"""Jobs run in processes of their own, one thread each; those that stand are not run again."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import signal
+import time
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+from agents.config import DemoConfig
+from agents.evaluation import (
+    PlayedFront,
+    check_study,
+    drive_seeds,
+    make_envs,
+    play_blind,
+    play_front,
+    price_of,
+    prices_of,
+    table_fronts,
+    tune_families,
+)
+from agents.policies import NetworkPolicy, RandomPolicy, load_policy
+from agents.study.job_results import JobResult, stands, write_result
+from agents.study.jobs import REFERENCES, Job
+from agents.training import train_scheduler
+from shotenv.config import EnvConfig
+from shotenv.decision import open_problem
+from unwrap.support import progress
+
+
+def run_jobs(jobs: Sequence[Job], folder: Path, *, workers: int) -> None:
+    """Run what does not stand yet in `folder`.
+
+    Raises
+    ------
+    ValueError
+        Results of another schema or configuration are there, before anything is run; or jobs
+        failed, after all others were run.
+    KeyboardInterrupt
+        Ctrl-C; what was finished is kept, and the message says how much.
+    """
+    # Renders and predicts, too, what several processes would else do at the same time.
+    banks = {job.preset: bank_of(job.config.env) for job in jobs}
+    left = [
+        (job, told)
+        for job in jobs
+        if not stands(folder / job.name, told := job.depends_on(banks[job.preset]))
+    ]
+    failed: list[str] = []
+    done = len(jobs) - len(left)
+    with (
+        progress(len(jobs), "study", "job", done=done) as bar,
+        # Not forked: torch's threads do not survive that.
+        ProcessPoolExecutor(
+            workers, multiprocessing.get_context("spawn"), initializer=_begin_worker
+        ) as pool,
+    ):
+        try:
+            waiting = {pool.submit(run_job, job, folder, told): job for job, told in left}
+            for future in as_completed(waiting):
+                if (error := future.exception()) is not None:
+                    failed.append(f"{waiting[future].name}: {error or type(error).__name__}")
+                bar.update(1)
+        except KeyboardInterrupt:
+            for process in multiprocessing.active_children():
+                process.terminate()
+            pool.shutdown(cancel_futures=True)
+            kept = sum(folder.joinpath(f"{job.name}.json").is_file() for job in jobs)
+            raise KeyboardInterrupt(
+                f"{kept} of {len(jobs)} jobs are kept; the same command continues"
+            ) from None
+    if failed:
+        raise ValueError(
+            f"{len(failed)} of {len(jobs)} jobs failed, the others are kept: {'; '.join(failed)}"
+        )
+
+
+def bank_of(config: EnvConfig) -> str:
+    """Fingerprint of the bank, which is rendered and predicted where it does not stand yet."""
+    return open_problem(config.model_copy(update={"split": "all"})).bank.fingerprint
+
+
+def run_job(job: Job, folder: Path, depends_on: dict[str, Any]) -> None:
+    """Run one job; its bars and lines go to a file beside its result."""
+    began, stem = time.process_time(), folder / job.name
+    stem.parent.mkdir(parents=True, exist_ok=True)
+    with (
+        stem.with_suffix(".log").open("w", encoding="utf-8") as log,
+        contextlib.redirect_stderr(log),
+    ):
+        config, arrays = job.config, {}
+        if job.kind == REFERENCES:
+            study = config.study
+            envs = make_envs(config.env, study.split, study.drives, "Disabled")
+            fronts = {"blind": play_blind(envs, drive_seeds(study, study.drives))}
+            problem = open_problem(config.env.model_copy(update={"split": study.split}))
+            optimum, arrays["cool_eight_m"] = table_fronts(problem, study)
+            fronts |= {"optimum": optimum} if optimum else {}
+        else:
+            fronts = {"front": front_of_job(job, stem)}
+    write_result(stem, JobResult(fronts, time.process_time() - began, arrays), depends_on)
+
+
+def front_of_job(job: Job, stem: Path) -> PlayedFront:
+    """Train or tune, and play at every price of the study and at that of the preset."""
+    config, price = job.config, price_of(job.config.env)
+    prices = tuple(sorted({*config.study.prices, price}))
+    if job.kind in ("learned", "saved"):
+        # Training resumes in this folder where it was interrupted.
+        scheduler = load_policy(job.folder) if job.folder else train_scheduler(config, stem)
+        return _front_of_scheduler(config, scheduler, price)
+    if job.kind == "random":
+        policy = RandomPolicy(job.seed)
+        return _played(config, lambda price: policy, prices)
+    study = config.study.model_copy(update={"families": (job.policy,)})
+    (tuned,) = tune_families(config.model_copy(update={"study": study})).values()
+    return _played(config, lambda price: tuned[price].policy, prices)
+
+
+def _front_of_scheduler(config: DemoConfig, scheduler: NetworkPolicy, price: float) -> PlayedFront:
+    check_study(config, scheduler)
+    # Also where the preset's price is not among those of its training: it is what the reward asks.
+    own = tuple(sorted({*prices_of(scheduler, config.study.prices), price}))
+    return _played(config, lambda price: scheduler, own)
+
+
+def _played(config: DemoConfig, at_price: Any, prices: Sequence[float]) -> PlayedFront:
+    study = config.study
+    envs = make_envs(config.env, study.split, study.drives, "Disabled")
+    # Of a rule its words; a network has none.
+    return play_front(
+        at_price,
+        envs,
+        drive_seeds(study, study.drives),
+        prices,
+        names=lambda policy: "scheduler" if isinstance(policy, NetworkPolicy) else str(policy),
+    )
+
+
+def _begin_worker() -> None:
+    """One thread; Ctrl-C, which a terminal sends to all, ends it without a word."""
+    import torch
+
+    torch.set_num_threads(1)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
