@@ -62,7 +62,11 @@ def config(tiny_bank, tiny_unwrapper) -> DemoConfig:
                 "reward": {"power": 0.005},
                 "protect": False,
             },
-            "agent": {"total_steps": 96, "num_envs": 2, "rollout_steps": 24, "batch_size": 16},
+            "agent": {
+                "algorithm": "ppo",
+                "power_price": None,
+                "ppo": {"total_steps": 96, "num_envs": 2, "rollout_steps": 24, "batch_size": 16},
+            },
             "study": {
                 "drives": 3,
                 "tuning_drives": 2,

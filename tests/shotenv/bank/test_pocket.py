@@ -22,7 +22,7 @@ from shotenv.decision.problem import open_problem
 
 def test_the_bank_that_ships_is_found_by_name_alone():
     pocket = open_bank("pocket", render=False)
-    assert isinstance(pocket, ThinnedBank) and pocket.name == "pocket" and pocket.every == 8
+    assert isinstance(pocket, ThinnedBank) and pocket.name == "pocket" and pocket.every == 10
     assert len(pocket) >= 3000 and len(pocket.clips) >= 100
     assert len(pocket.splits("test")) >= 25
     for split in ("train", "validation", "test", "shift", "all"):
