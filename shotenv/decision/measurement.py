@@ -200,19 +200,6 @@ def _measured_alike(
     )
 
 
-def measure_prefixes(
-    problem: Problem, drive: Drive, step: Tensor, *, noise: Sequence[Tensor] | None = None
-) -> list[Measurement]:
-    """As `measure_frames` of 2, 4 and 8 samples, from one acquisition of 8."""
-    acquired = acquire_depths(problem, drive, step, tuple(Shots), noise=noise)
-    scores = [score_of(problem, one) for one in acquired]
-    error_of_four = scores[Shots.FOUR.action].error
-    return [
-        Measurement(score, error_of_four, told_by(problem, acquired[: place + 1]))
-        for place, score in enumerate(scores)
-    ]
-
-
 def score_of(problem: Problem, acquisition: Acquisition) -> DepthScore:
     """Score over the pixels that the drive's own laser lights enough, whatever is emitted now."""
     return score_depth(

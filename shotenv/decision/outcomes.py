@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import islice
 
 import torch
 from torch import Tensor
 
 from shotenv.config import ROOM_K
-from shotenv.decision.acquire import noise_of
 from shotenv.decision.drive import Drive
 from shotenv.decision.features import TOLD
-from shotenv.decision.measurement import Measurement, measure_prefixes
+from shotenv.decision.measurement import Measurement, measure_frames
 from shotenv.decision.problem import Problem
 from shotenv.decision.rewards import reference_terms, reward, reward_terms
 from shotenv.decision.score import DepthScore, no_depth
 from shotenv.decision.transition import SHOTS_OF_ACTION, cost_of
-from unwrap.signal import Shots
-from unwrap.support import concatenate, mapped
+from unwrap.support import concatenate, mapped, take
 
 ACTIONS = len(SHOTS_OF_ACTION)
+MOST_PIXELS = 2**20
+"""Measured at once: more would only take more memory."""
 
 
 @dataclass(frozen=True)
@@ -63,9 +62,7 @@ def outcomes_of_all_actions(problem: Problem, drive: Drive) -> Outcomes:
     # How warm the laser will be depends on the choices before; whoever plays on the table adds it.
     room_k = torch.full_like(drive.ambient_k, ROOM_K)
 
-    steps = torch.arange(frames).unsqueeze(1)
-    measured = concatenate([_measure_all(problem, drive, step) for step in steps])
-    measured = mapped(lambda rows: rows.unflatten(0, (frames, ACTIONS)), measured)
+    measured = _measure_all(problem, drive)
     cost = cost_of(problem, drive, SHOTS_OF_ACTION, room_k)
     working = torch.zeros(frames, ACTIONS, dtype=torch.bool)
     terms = reward_terms(measured.score, cost, drive.always_eight, working)
@@ -92,11 +89,17 @@ def outcomes_of_all_actions(problem: Problem, drive: Drive) -> Outcomes:
     )
 
 
-def _measure_all(problem: Problem, drive: Drive, step: Tensor) -> Measurement:
-    """All three acquisitions of the frame at `step` [1], a batch of three.
+def _measure_all(problem: Problem, drive: Drive) -> Measurement:
+    """All three acquisitions of every frame of `drive`, fields [T, 3, ...].
 
     They share the noise of the longest, as the frames of fewer samples are prefixes of it.
     """
-    normals = noise_of(drive, step, problem.bank.height, problem.bank.width)
-    noise = list(islice(normals, Shots.EIGHT))
-    return concatenate(measure_prefixes(problem, drive, step, noise=noise))
+    frames = problem.config.frames_per_drive
+    steps = torch.arange(frames).repeat_interleave(ACTIONS)
+    shots = SHOTS_OF_ACTION.repeat(frames)
+    at_once = max(1, MOST_PIXELS // (problem.bank.height * problem.bank.width))
+    measured = [
+        measure_frames(problem, take(drive, torch.zeros_like(step)), step, taken)
+        for step, taken in zip(steps.split(at_once), shots.split(at_once), strict=True)
+    ]
+    return mapped(lambda rows: rows.unflatten(0, (frames, ACTIONS)), concatenate(measured))

@@ -15,7 +15,6 @@ from shotenv.decision.measurement import (
     _measured_by_maps,
     measure_by_shots,
     measure_frames,
-    measure_prefixes,
 )
 from shotenv.decision.problem import open_problem
 from shotenv.decision.transition import reset, step
@@ -92,16 +91,6 @@ def test_the_reference_is_the_error_of_four_whatever_is_taken(problem):
         problem, state, torch.tensor([0, 2]), state.drive.laser_power_w, measure_frames
     )
     assert torch.equal(by_shots.error_of_four, four)
-
-
-def test_prefixes_measure_as_acquisitions_of_their_own(problem):
-    state = reset(problem, [3])
-    for shots, found in zip(Shots, measure_prefixes(problem, state.drive, state.step), strict=True):
-        alone = measure_frames(problem, state.drive, state.step, shots)
-        told = [feature.least_shots <= shots for feature in SEEN_FEATURES]
-        assert torch.equal(found.features[:, told], alone.features[:, told])
-        assert torch.equal(found.score.error, alone.score.error)
-        assert torch.equal(found.error_of_four, alone.error_of_four)
 
 
 def test_the_stored_offset_is_needed_with_two_samples_alone(problem):

@@ -13,7 +13,7 @@ from shotenv.config.env import RewardConfig
 from shotenv.config.keywords import env_config
 from shotenv.config.reader import ConfigError
 from shotenv.decision.drive import chain_clips
-from shotenv.decision.features import FEATURE_NAMES, LIMIT, frame_means
+from shotenv.decision.features import FEATURE_NAMES, LIMIT, TOLD, frame_means
 from shotenv.decision.outcomes import outcomes_of_all_actions
 from shotenv.decision.problem import open_problem
 from shotenv.decision.rewards import TERMS, reward, reward_terms
@@ -215,6 +215,8 @@ def test_the_table_holds_what_each_step_pays(problem):
         assert outcome.reward.item() == table.reward[frame, action].item()
         assert outcome.cost.heat_j.item() == table.heat_j[frame, action].item()
         assert outcome.score.error.item() == table.terms["error"][frame, action].item()
+        told = TOLD[int(outcome.shots)]
+        assert torch.equal(state.seen.features[0, told], table.features[frame, action, told])
     assert set(table.terms) == set(TERMS)
 
 
