@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from torch import nn
 
 from agents.deploy.agreement import CheckCases
-from agents.policies import NetworkPolicy, linear_layers, widths_of
+from agents.policies import NetworkPolicy, diagonal_blocks, linear_layers, widths_of
 
 HEADER, SOURCE, VECTORS = "shotenv_policy.h", "shotenv_policy.c", "shotenv_vectors.h"
 
@@ -54,9 +55,10 @@ int shotenv_choose(const float observation[SHOTENV_FEATURES],
 def c_source(policy: NetworkPolicy) -> str:
     """The source: weights, the network, and a test of it behind `SHOTENV_SELF_TEST`."""
     layers, widths = linear_layers(policy.network), widths_of(policy.network)
+    blocks = [diagonal_blocks(layer) for layer in layers]
     weights = "\n".join(
-        f"static const float weight{n}[{layer.out_features}][{layer.in_features}] = "
-        f"{_matrix(layer.weight.numpy())};\n"
+        f"static const float weight{n}[{layer.out_features}][{layer.in_features // blocks[n]}] = "
+        f"{_matrix(weights_in_blocks(layer, blocks[n]))};\n"
         f"static const float bias{n}[{layer.out_features}] = {_row(layer.bias.numpy())};\n"
         for n, layer in enumerate(layers)
     )
@@ -65,8 +67,8 @@ def c_source(policy: NetworkPolicy) -> str:
         last = n == len(layers) - 1
         out = "scores" if last else f"hidden{n}"
         steps.append(
-            f"    linear(&weight{n}[0][0], bias{n}, {seen}, {layer.in_features}, {out}, "
-            f"{layer.out_features}, {int(not last)});"
+            f"    linear(&weight{n}[0][0], bias{n}, {seen}, {layer.in_features // blocks[n]}, {out}, "
+            f"{layer.out_features // blocks[n]}, {blocks[n]}, {int(not last)});"
         )
         seen = out
     memory = "\n".join(f"    float hidden{n}[{w}];" for n, w in enumerate(widths[1:-1]))
@@ -83,14 +85,16 @@ const char *const shotenv_feature_names[SHOTENV_FEATURES] = {{
 
 const int shotenv_samples[SHOTENV_ACTIONS] = {{2, 4, 8}};
 
+/* Each block of outputs reads a block of inputs of its own; the sizes are those of one block. */
 static void linear(const float *weight, const float *bias, const float *in, int inputs,
-                   float *out, int outputs, int activated)
+                   float *out, int outputs, int blocks, int activated)
 {{
     int i, j;
-    for (j = 0; j < outputs; ++j) {{
+    for (j = 0; j < blocks * outputs; ++j) {{
+        const float *read = in + j / outputs * inputs;
         float sum = bias[j];
         for (i = 0; i < inputs; ++i)
-            sum += weight[j * inputs + i] * in[i];
+            sum += weight[j * inputs + i] * read[i];
         out[j] = activated ? {bent} : sum;
     }}
 }}
@@ -151,6 +155,13 @@ int main(void)
 }}
 #endif
 """
+
+
+def weights_in_blocks(layer: nn.Linear, blocks: int) -> np.ndarray:
+    """Weights [outputs, inputs / blocks] of a layer of `diagonal_blocks`, without the zeros."""
+    outputs, inputs = layer.weight.shape
+    each = layer.weight.numpy().reshape(blocks, outputs // blocks, blocks, inputs // blocks)
+    return np.concatenate([each[n, :, n] for n in range(blocks)])
 
 
 def c_vectors(cases: CheckCases) -> str:

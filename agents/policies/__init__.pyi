@@ -28,6 +28,7 @@ from .rules import (
     rule_in_words as rule_in_words,
 )
 from .score_networks import (
+    diagonal_blocks as diagonal_blocks,
     linear_layers as linear_layers,
     mean_network as mean_network,
     rescaled_network as rescaled_network,

@@ -101,6 +101,29 @@ def mean_quantile_network(network: Any) -> nn.Sequential:
     return nn.Sequential(*modules[:-1], mean)
 
 
+def diagonal_blocks(layer: nn.Linear) -> int:
+    """Most equal blocks along the diagonal outside of which a layer's weights are 0.
+
+    Examples
+    --------
+    Four outputs of four inputs, where the first two read the first two inputs alone:
+
+    >>> layer = nn.Linear(4, 4)
+    >>> _ = layer.weight.data.copy_(torch.block_diag(torch.ones(2, 2), torch.ones(2, 2)))
+    >>> diagonal_blocks(layer)
+    2
+    """
+    outputs, inputs = layer.weight.shape
+    for blocks in range(min(outputs, inputs), 1, -1):
+        if outputs % blocks or inputs % blocks:
+            continue
+        block = torch.ones(outputs // blocks, inputs // blocks)
+        outside = torch.block_diag(*[block] * blocks) == 0
+        if not layer.weight[outside].any():
+            return blocks
+    return 1
+
+
 def mean_network(networks: Sequence[nn.Sequential]) -> nn.Sequential:
     """One network whose scores are the mean of those of `networks`, which are formed alike.
 

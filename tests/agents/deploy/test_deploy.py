@@ -27,7 +27,7 @@ from agents.deploy.onnx_policy import check_onnx, onnx_policy
 from agents.evaluation.play import make_envs
 from agents.policies.fixed import CyclePolicy, FixedPolicy, RandomPolicy
 from agents.policies.learned import NetworkPolicy, Provenance
-from agents.policies.score_networks import score_network
+from agents.policies.score_networks import mean_network, score_network
 from shotenv.config.keywords import env_config
 from shotenv.decision.features import FEATURE_NAMES
 
@@ -69,6 +69,18 @@ def test_c_chooses_as_torch_a_million_times(tmp_path, activation, count):
     assert different_actions(cases, actions) == 0
     # Rounding decides next to nothing.
     assert (actions != cases.actions).sum() <= 50
+
+
+def test_members_of_a_mean_network_are_written_apart(tmp_path):
+    torch.manual_seed(3)
+    members = [score_network((35, 16, 8, 3), "tanh") for _ in range(5)]
+    told = Provenance(algorithm="regression", feature_names=FEATURE_NAMES[:35])
+    policy = NetworkPolicy(mean_network(members), told)
+    found = export_policy(policy, tmp_path, onnx=False)
+    # Five times 16 x 8 between the hidden layers, instead of 80 x 40.
+    assert found["cost"]["multiply_accumulates"] == 35 * 80 + 5 * 16 * 8 + 40 * 3
+    cases = random_cases(policy, 100_000, seed=6)
+    assert different_actions(cases, chosen_by_c(tmp_path, cases)) == 0
 
 
 def test_c_chooses_as_torch_on_recorded_observations(
