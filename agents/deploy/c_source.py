@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from torch import nn
 
 from agents.deploy.agreement import CheckCases
-from agents.policies import NetworkPolicy, diagonal_blocks, linear_layers, widths_of
+from agents.policies import NetworkPolicy, linear_layers, weights_in_blocks, widths_of
 
 HEADER, SOURCE, VECTORS = "shotenv_policy.h", "shotenv_policy.c", "shotenv_vectors.h"
 
@@ -55,20 +54,19 @@ int shotenv_choose(const float observation[SHOTENV_FEATURES],
 def c_source(policy: NetworkPolicy) -> str:
     """The source: weights, the network, and a test of it behind `SHOTENV_SELF_TEST`."""
     layers, widths = linear_layers(policy.network), widths_of(policy.network)
-    blocks = [diagonal_blocks(layer) for layer in layers]
-    weights = "\n".join(
-        f"static const float weight{n}[{layer.out_features}][{layer.in_features // blocks[n]}] = "
-        f"{_matrix(weights_in_blocks(layer, blocks[n]))};\n"
-        f"static const float bias{n}[{layer.out_features}] = {_row(layer.bias.numpy())};\n"
-        for n, layer in enumerate(layers)
-    )
-    steps, seen = [], "observation"
+    weights, steps, seen = "", [], "observation"
     for n, layer in enumerate(layers):
-        last = n == len(layers) - 1
+        each, last = weights_in_blocks(layer), n == len(layers) - 1
+        blocks, outputs, inputs = each.shape
+        weights += (
+            f"static const float weight{n}[{blocks * outputs}][{inputs}] = "
+            f"{_matrix(each.flatten(0, 1).numpy())};\n"
+            f"static const float bias{n}[{layer.out_features}] = {_row(layer.bias.numpy())};\n\n"
+        )
         out = "scores" if last else f"hidden{n}"
         steps.append(
-            f"    linear(&weight{n}[0][0], bias{n}, {seen}, {layer.in_features // blocks[n]}, {out}, "
-            f"{layer.out_features // blocks[n]}, {blocks[n]}, {int(not last)});"
+            f"    linear(&weight{n}[0][0], bias{n}, {seen}, {inputs}, {out}, {outputs}, {blocks}, "
+            f"{int(not last)});"
         )
         seen = out
     memory = "\n".join(f"    float hidden{n}[{w}];" for n, w in enumerate(widths[1:-1]))
@@ -78,8 +76,7 @@ def c_source(policy: NetworkPolicy) -> str:
     include = "#include <math.h>\n\n" if uses_tanh else ""
     return f"""#include "{HEADER}"
 
-{include}{weights}
-const char *const shotenv_feature_names[SHOTENV_FEATURES] = {{
+{include}{weights}const char *const shotenv_feature_names[SHOTENV_FEATURES] = {{
 {names}
 }};
 
@@ -155,13 +152,6 @@ int main(void)
 }}
 #endif
 """
-
-
-def weights_in_blocks(layer: nn.Linear, blocks: int) -> np.ndarray:
-    """Weights [outputs, inputs / blocks] of a layer of `diagonal_blocks`, without the zeros."""
-    outputs, inputs = layer.weight.shape
-    each = layer.weight.numpy().reshape(blocks, outputs // blocks, blocks, inputs // blocks)
-    return np.concatenate([each[n, :, n] for n in range(blocks)])
 
 
 def c_vectors(cases: CheckCases) -> str:

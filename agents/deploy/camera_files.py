@@ -12,7 +12,7 @@ from agents.deploy.agreement import CheckCases, different_actions, random_cases
 from agents.deploy.c_check import run_self_test
 from agents.deploy.c_source import HEADER, SOURCE, VECTORS, c_header, c_source, c_vectors
 from agents.deploy.onnx_policy import check_onnx, onnx_metadata, onnx_policy
-from agents.policies import NetworkPolicy, diagonal_blocks, linear_layers, widths_of
+from agents.policies import NetworkPolicy, linear_layers, weights_in_blocks, widths_of
 from unwrap.support import write_bytes, write_text
 
 ONNX: Final = "policy.onnx"
@@ -45,9 +45,7 @@ def cost_of_choice(policy: NetworkPolicy) -> Cost:
     """Cost of one choice of `policy`."""
     widths = np.array(widths_of(policy.network))
     # Of a block-diagonal layer the blocks alone are written.
-    products = sum(
-        layer.weight.numel() // diagonal_blocks(layer) for layer in linear_layers(policy.network)
-    )
+    products = sum(weights_in_blocks(layer).numel() for layer in linear_layers(policy.network))
     hidden = int(widths[1:-1].sum())
     values = products + int(widths[1:].sum())
     return Cost(4 * values, 4 * (hidden + int(widths[-1])), products, hidden)

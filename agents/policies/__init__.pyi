@@ -28,11 +28,11 @@ from .rules import (
     rule_in_words as rule_in_words,
 )
 from .score_networks import (
-    diagonal_blocks as diagonal_blocks,
     linear_layers as linear_layers,
     mean_network as mean_network,
     rescaled_network as rescaled_network,
     score_network as score_network,
+    weights_in_blocks as weights_in_blocks,
     widths_of as widths_of,
 )
 from .watching import (

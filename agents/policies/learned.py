@@ -19,6 +19,7 @@ from agents.policies.score_networks import (
     Activation,
     activation_of,
     actor_network,
+    in_blocks,
     mean_quantile_network,
     q_network,
     require_widths,
@@ -130,6 +131,8 @@ class NetworkPolicy(Policy):
         self.activation = activation_of(network)
         require_widths(network, provenance.feature_names)
         self.network = copy.deepcopy(network).requires_grad_(False).eval()
+        # What is run: of a mean of networks each for itself.
+        self._runs = in_blocks(self.network)
         self.provenance = provenance
 
     @property
@@ -169,7 +172,8 @@ class NetworkPolicy(Policy):
                 + ", ".join(self.feature_names)
             )
         with torch.inference_mode():
-            return self.network(features).numpy()
+            found = self._runs(features.reshape(-1, expected))
+        return found.reshape(*features.shape[:-1], -1).numpy()
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
         """The action of the highest score, the first of equal ones."""

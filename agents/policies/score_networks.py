@@ -124,6 +124,42 @@ def diagonal_blocks(layer: nn.Linear) -> int:
     return 1
 
 
+def weights_in_blocks(layer: nn.Linear) -> torch.Tensor:
+    """Weights of the `diagonal_blocks` of a layer, without the zeros: [B, O / B, I / B]."""
+    blocks = diagonal_blocks(layer)
+    outputs, inputs = layer.weight.shape
+    each = layer.weight.detach().view(blocks, outputs // blocks, blocks, inputs // blocks)
+    return torch.stack([each[n, :, n] for n in range(blocks)])
+
+
+class BlockLinear(nn.Module):
+    """A linear layer of `diagonal_blocks`, [N, I] to [N, O], that multiplies no zeros."""
+
+    def __init__(self, layer: nn.Linear) -> None:
+        super().__init__()
+        # [B, I / B, O / B] and [B, 1, O / B].
+        self.weight = weights_in_blocks(layer).transpose(1, 2).contiguous()
+        self.bias = layer.bias.detach().view(len(self.weight), 1, -1)
+
+    def forward(self, seen: torch.Tensor) -> torch.Tensor:
+        """Outputs [N, O] of inputs [N, I]."""
+        parts = seen.unflatten(1, (len(self.weight), -1)).transpose(0, 1)
+        found = torch.baddbmm(self.bias, parts, self.weight)
+        return found.transpose(0, 1).flatten(1)
+
+
+def in_blocks(network: nn.Sequential) -> nn.Sequential:
+    """A score network of [N, D] with each layer of several blocks as a `BlockLinear`."""
+    return nn.Sequential(
+        *(
+            BlockLinear(module)
+            if isinstance(module, nn.Linear) and diagonal_blocks(module) > 1
+            else module
+            for module in network
+        )
+    )
+
+
 def mean_network(networks: Sequence[nn.Sequential]) -> nn.Sequential:
     """One network whose scores are the mean of those of `networks`, which are formed alike.
 
