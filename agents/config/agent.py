@@ -52,7 +52,7 @@ class RegressionConfig(Section):
     """Regression of every action's worth on the observation, from counterfactual outcomes."""
 
     rounds: int = Field(4, ge=1, description="rounds of playing, looking ahead and fitting")
-    drives: int = Field(192, ge=1, description="different training drives")
+    drives: int = Field(512, ge=1, description="different training drives")
     validation_drives: int = Field(
         24, ge=1, description="validation drives that stop the fit and choose the round"
     )
@@ -60,7 +60,11 @@ class RegressionConfig(Section):
         12, ge=1, description="frames that each action is followed for; 1: its own frame alone"
     )
     gamma: Fraction = Field(0.9, description="discount per frame of those that follow")
-    stride: int = Field(4, ge=1, description="every how manieth frame of a drive is looked at")
+    heat_price: NonNegative = Field(
+        0.2, description="least price of power at the trip, where heat is short; 0: none"
+    )
+    heat_near_k: Positive = Field(2.0, description="margin to the trip where it begins, K")
+    stride: int = Field(10, ge=1, description="every how manieth frame of a drive is looked at")
     epsilon: Fraction = Field(
         0.5, description="share of random actions in the drive that has most; others have fewer"
     )

@@ -33,6 +33,7 @@ from agents.policies import (
 from agents.training.branching import Branches, Path as Played
 from agents.training.checkpoint import Checkpoint, Validate
 from agents.training.fitting import Frames, fit
+from agents.training.heat_price import with_heat_price
 from agents.training.scalars import Scalars
 from shotenv.decision import feature_index
 from unwrap.support import Range, progress
@@ -153,10 +154,16 @@ class RegressionTrainer:
         for number, played in enumerate(self._played[which]):
             # Neighbours are alike: every round takes others of them.
             chosen = slice(number % config.stride, None, config.stride)
-            worth = drives.follow(
-                played.states[chosen], follower, horizon=horizon, gamma=config.gamma
-            )
-            parts.append(Frames.of(played.observations[chosen], worth))
+            observations = played.observations[chosen]
+            # What it is worth at the price that heat asks for; what is observed is the drive's own.
+            states = [
+                with_heat_price(
+                    state, seen, heat_price=config.heat_price, near_k=config.heat_near_k
+                )
+                for state, seen in zip(played.states[chosen], observations, strict=True)
+            ]
+            worth = drives.follow(states, follower, horizon=horizon, gamma=config.gamma)
+            parts.append(Frames.of(observations, worth))
         return Frames.together(parts)
 
     def _tensors(self) -> dict[str, torch.Tensor]:
