@@ -116,6 +116,10 @@ def test_every_learner_trains_by_the_same_command(capsys, tmp_path, tiny, algori
     assert status == 0 and f"shotenv evaluate {tmp_path}" in out, err
     told = load_policy(tmp_path).provenance
     assert told.algorithm == algorithm and told.power_price == (0.01, 0.35)
+    rescored = json.loads((tmp_path / "validation.json").read_text())
+    chose, others = rescored["return_on_drives_that_chose"], rescored["return_on_others"]
+    assert f"{chose:.1f} on the drives that chose the policy, {others:.1f} on others" in err
+    assert chose != others and len(rescored["prices"]) == 4
 
 
 def test_a_group_lists_its_commands(capsys):
