@@ -42,6 +42,8 @@ from unwrap.signal import Shots
 from unwrap.support import progress, say
 
 SCHEDULER: Final = "scheduler"
+TOLD: Final = 6
+"""Most differences that a warning tells."""
 
 
 @dataclass(frozen=True)
@@ -153,6 +155,7 @@ def evaluate_scheduler(config: DemoConfig, scheduler: NetworkPolicy) -> Evaluati
     study = config.study
     check_study(config, scheduler)
     warn_of_prices(config, scheduler)
+    warn_of_environment(config.env, scheduler)
     tuned = tune_families(config)
     # The same environments for all, which remember what they measured: noise depends on drive and
     # frame alone, so that policies that take the same shots of a frame share its cost.
@@ -244,6 +247,33 @@ def warn_of_prices(config: DemoConfig, scheduler: NetworkPolicy) -> None:
             f"reward.power is {least:g} to {most:g}, outside of {low:g} to {high:g}, which the "
             "scheduler was trained with: expect less of it in the table of policies"
         )
+
+
+def warn_of_environment(env: EnvConfig, scheduler: NetworkPolicy) -> None:
+    """Say in what the environment differs from that of the training, where that is known."""
+    trained = scheduler.provenance.environment
+    # Prices are warned of elsewhere, and splits always differ.
+    now, then = (
+        {name: value for name, value in _flat(one).items() if name not in ("split", "reward.power")}
+        for one in (env.model_dump(mode="json"), trained)
+    )
+    # What only one of them has is of another version, not of another sensor.
+    others = [name for name in now if name in then and now[name] != then[name]]
+    if others:
+        told = "; ".join(f"{name} {now[name]} (trained: {then[name]})" for name in others[:TOLD])
+        more = f"; and {len(others) - TOLD} more" if len(others) > TOLD else ""
+        say(f"the scheduler was trained in another environment: {told}{more}")
+
+
+def _flat(section: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Fields of nested sections by their dotted names."""
+    found: dict[str, Any] = {}
+    for name, value in section.items():
+        if isinstance(value, Mapping):
+            found |= _flat(value, f"{prefix}{name}.")
+        else:
+            found[prefix + name] = value
+    return found
 
 
 def drive_s(config: EnvConfig) -> float:

@@ -64,6 +64,8 @@ class Provenance(Section):
         Lowest and highest weight of power (`reward.power`) that it was trained with.
     training : dict
         Configuration of the training.
+    environment : dict
+        Configuration of the environment that it was trained in; empty where it is not known.
     seed : int
         Of the training.
     versions : dict of str to str
@@ -74,6 +76,7 @@ class Provenance(Section):
     feature_names: tuple[str, ...]
     power_price: Range | None = None
     training: dict[str, Any] = Field(default_factory=dict)
+    environment: dict[str, Any] = Field(default_factory=dict)
     seed: int = 0
     versions: dict[str, str] = Field(default_factory=installed_versions)
 
@@ -96,6 +99,7 @@ class Description(Section):
     activation: Activation
     power_price: Range | None
     training: dict[str, Any]
+    environment: dict[str, Any] = Field(default_factory=dict)  # older files have none
     seed: int
     versions: dict[str, str]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -14,7 +14,9 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
+from agents.config import AgentConfig
 from agents.policies import NetworkPolicy, Provenance, first_line
+from shotenv.config import EnvConfig
 from unwrap.support import write_bytes
 
 # One file, replaced whole: network, optimiser and progress of the same round, or none of them.
@@ -54,6 +56,20 @@ class TrainingState:
     def in_words(self) -> str:
         """For a progress bar."""
         return f"validation return {self.last_return:.1f}, best {self.best_return:.1f}"
+
+
+def provenance_of(
+    config: AgentConfig, feature_names: Sequence[str], env: EnvConfig | None
+) -> Provenance:
+    """What a run is told and what its policies tell; `env` has the prices of its drives."""
+    return Provenance(
+        algorithm=config.algorithm,
+        feature_names=tuple(feature_names),
+        power_price=env.reward.power if env else None,
+        training=config.told(),
+        environment=env.model_dump(mode="json") if env else {},
+        seed=config.seed,
+    )
 
 
 class Checkpoint:

@@ -23,11 +23,18 @@ from stable_baselines3.common.utils import set_random_seed
 from tqdm import tqdm
 
 from agents.config import AgentConfig
-from agents.policies import NetworkPolicy, Provenance
-from agents.training.checkpoint import Checkpoint, TrainingState, Validate, training_drives
+from agents.policies import NetworkPolicy
+from agents.training.checkpoint import (
+    Checkpoint,
+    TrainingState,
+    Validate,
+    provenance_of,
+    training_drives,
+)
 from agents.training.sb3_vector import Sb3VecEnv
 from agents.training.scalars import Scalars
-from unwrap.support import Range, progress
+from shotenv.config import EnvConfig
+from unwrap.support import progress
 
 
 class PpoTrainer:
@@ -49,8 +56,8 @@ class PpoTrainer:
         Gets the checkpoint, and the best policy as `policy.safetensors` and `agent.json`.
     warm : callable, optional
         Trains the actor before the first round, see `agents.training.warmup`.
-    power_price : (float, float), optional
-        Range of the weight of power in the drives, which the saved policy tells.
+    env : EnvConfig, optional
+        Of the environments, which the saved policy tells.
 
     Raises
     ------
@@ -67,7 +74,7 @@ class PpoTrainer:
         validate: Validate,
         out: Path,
         warm: Callable[[ActorCriticPolicy], None] | None = None,
-        power_price: Range | None = None,
+        env: EnvConfig | None = None,
     ) -> None:
         ppo = config.ppo
         self._envs, self._config, self._validate, self._out = envs, config, validate, out
@@ -92,13 +99,7 @@ class PpoTrainer:
             seed=config.seed,
             device="cpu",  # two small layers: copying to a GPU would take longer
         )
-        self._provenance = Provenance(
-            algorithm="ppo",
-            feature_names=tuple(feature_names),
-            power_price=power_price,
-            training=config.told(),
-            seed=config.seed,
-        )
+        self._provenance = provenance_of(config, feature_names, env)
         self._checkpoint = Checkpoint(out, self._provenance)
         self._scalars = Scalars(out if config.tensorboard else None)
 

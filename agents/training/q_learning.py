@@ -16,11 +16,12 @@ from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
 from agents.config import AgentConfig
-from agents.policies import NetworkPolicy, Provenance
-from agents.training.checkpoint import TrainingState, Validate
+from agents.policies import NetworkPolicy
+from agents.training.checkpoint import TrainingState, Validate, provenance_of
 from agents.training.sb3_vector import Sb3VecEnv
 from agents.training.scalars import Scalars
-from unwrap.support import Range, progress
+from shotenv.config import EnvConfig
+from unwrap.support import progress
 
 
 def quantile_learner() -> Any:
@@ -56,8 +57,8 @@ class QLearner:
         Mean return of a policy on validation drives.
     out : Path
         Gets the best policy as `policy.safetensors` and `agent.json`.
-    power_price : (float, float), optional
-        Range of the weight of power in the drives, which the saved policy tells.
+    env : EnvConfig, optional
+        Of the environments, which the saved policy tells.
     """
 
     def __init__(
@@ -67,7 +68,7 @@ class QLearner:
         config: AgentConfig,
         validate: Validate,
         out: Path,
-        power_price: Range | None = None,
+        env: EnvConfig | None = None,
     ) -> None:
         learner = config.dqn
         self._config, self._validate, self._out = config, validate, out
@@ -93,13 +94,7 @@ class QLearner:
             seed=config.seed,
             device="cpu",  # two small layers: copying to a GPU would take longer
         )
-        self._provenance = Provenance(
-            algorithm=config.algorithm,
-            feature_names=tuple(feature_names),
-            power_price=power_price,
-            training=config.told(),
-            seed=config.seed,
-        )
+        self._provenance = provenance_of(config, feature_names, env)
         self._scalars = Scalars(out if config.tensorboard else None)
 
     @property

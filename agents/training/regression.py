@@ -26,17 +26,16 @@ from agents.policies import (
     NetworkPolicy,
     Observation,
     Policy,
-    Provenance,
     RandomPolicy,
     score_network,
 )
 from agents.training.branching import Branches, Path as Played
-from agents.training.checkpoint import Checkpoint, Validate
+from agents.training.checkpoint import Checkpoint, Validate, provenance_of
 from agents.training.fitting import Frames, fit
 from agents.training.heat_price import with_heat_price
 from agents.training.scalars import Scalars
 from shotenv.decision import feature_index
-from unwrap.support import Range, progress
+from unwrap.support import progress
 
 LEAST_RANDOM: Final = 0.02
 """Share of random actions in the drive that has the fewest (assumed)."""
@@ -48,9 +47,8 @@ class RegressionTrainer:
     Parameters
     ----------
     training, judging : Branches
-        Drives to learn from, and drives of other clips that say when to stop.
-    power_price : (float, float)
-        Range that prices of power are drawn from, log-uniformly.
+        Drives to learn from, and drives of other clips that say when to stop. Prices of power are
+        drawn log-uniformly from the range that their environment has.
     config : AgentConfig
     validate : callable
         Mean return of a policy on validation drives; the best round's policy is kept.
@@ -68,23 +66,16 @@ class RegressionTrainer:
         self,
         training: Branches,
         judging: Branches,
-        power_price: Range,
         config: AgentConfig,
         validate: Validate,
         out: Path,
     ) -> None:
         self._drives = training, judging
-        self._power_price, self._config = power_price, config
+        self._power_price, self._config = training.problem.config.reward.power, config
         for name in config.regression.unseen:
             feature_index(training.feature_names, name)  # refuses what there is none of
         self._validate, self._out = validate, out
-        self._provenance = Provenance(
-            algorithm="regression",
-            feature_names=training.feature_names,
-            power_price=power_price,
-            training=config.told(),
-            seed=config.seed,
-        )
+        self._provenance = provenance_of(config, training.feature_names, training.problem.config)
         self._checkpoint = Checkpoint(out, self._provenance)
         self._scalars = Scalars(out if config.tensorboard else None)
         # Of each round.

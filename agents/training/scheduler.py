@@ -69,11 +69,11 @@ def _trained(
     if agent.algorithm == "regression":
         seeds = training_drives(agent.seed, agent.regression.drives).tolist()
         training = branches_of(env, "train", seeds)
-        return RegressionTrainer(training, judging, env.reward.power, agent, validate, out).run()
+        return RegressionTrainer(training, judging, agent, validate, out).run()
     if agent.algorithm == "ppo":
         return ppo_trainer(env, config, validate, out).run()
     envs = Sb3VecEnv(make_envs(env, "train", agent.dqn.num_envs, "SameStep"))
-    return QLearner(envs, FEATURE_NAMES, agent, validate, out, env.reward.power).run()
+    return QLearner(envs, FEATURE_NAMES, agent, validate, out, env).run()
 
 
 def rescore(
@@ -115,7 +115,7 @@ def ppo_trainer(env: EnvConfig, config: DemoConfig, validate: Validate, out: Pat
         validate,
         out,
         warm if agent.ppo.warm_start else None,
-        env.reward.power,
+        env,
     )
 
 

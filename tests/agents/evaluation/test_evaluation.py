@@ -18,6 +18,7 @@ from agents.evaluation.study import (
     families_of,
     play_all,
     tune_families,
+    warn_of_environment,
     warn_of_prices,
 )
 from agents.evaluation.summary import best_fixed, best_rival, difference, summary, tails
@@ -33,6 +34,7 @@ from agents.report.evaluation_files import write_evaluation
 from agents.report.page import write_report
 from agents.report.strip import take_strip
 from agents.training.scheduler import train_scheduler
+from shotenv.config.keywords import env_config
 from shotenv.config.reader import configs_dir, merged, read_config
 from shotenv.decision.features import FEATURE_NAMES
 from shotenv.decision.problem import open_problem
@@ -292,6 +294,21 @@ def test_prices_outside_of_the_training_are_named(config, capsys, trained, says)
     warn_of_prices(config, scheduler_of(trained))
     told = capsys.readouterr().err
     assert says in told and bool(told) == bool(says)
+
+
+def test_another_environment_than_that_of_the_training_is_named(capsys):
+    trained, hot = env_config(), env_config("hot", split="shift")
+    told = Provenance(
+        algorithm="none", feature_names=("power",), environment=trained.model_dump(mode="json")
+    )
+    scheduler = NetworkPolicy(score_network((1, 3), "tanh"), told)
+    warn_of_environment(env_config(split="test", reward={"power": 0.3}), scheduler)
+    assert capsys.readouterr().err == ""
+    warn_of_environment(hot, scheduler)
+    said = capsys.readouterr().err
+    now, then = (one.laser.thermal_resistance_k_per_w for one in (hot, trained))
+    assert "trained in another environment: laser." in said
+    assert f"laser.thermal_resistance_k_per_w {now} (trained: {then})" in said
 
 
 def test_a_scheduler_that_knows_none_of_the_prices_is_refused(config):

@@ -10,7 +10,9 @@ from agents.config.agent import AgentConfig, DqnConfig
 from agents.policies.learned import load_policy
 from agents.training.q_learning import QLearner
 from agents.training.sb3_vector import Sb3VecEnv
+from shotenv.config.keywords import env_config
 
+PRICED = env_config(reward={"power": (0.01, 0.35)})
 LEARNER = DqnConfig(
     total_steps=1200,
     num_envs=4,
@@ -28,7 +30,7 @@ LEARNER = DqnConfig(
 
 def learner(algorithm, out, check=validate, **changes):
     config = AgentConfig(algorithm=algorithm, hidden=(32,), seed=2, dqn=LEARNER, **changes)
-    return QLearner(Sb3VecEnv(make_envs()), NAMES, config, check, out, (0.01, 0.35))
+    return QLearner(Sb3VecEnv(make_envs()), NAMES, config, check, out, PRICED)
 
 
 @pytest.mark.parametrize("algorithm", ["dqn", "qrdqn"])

@@ -83,7 +83,7 @@ def test_features_that_there_are_none_of_are_refused(tiny_kwargs, tmp_path):
     learner = SMALL.regression.model_copy(update={"unseen": ("mood",)})
     config = SMALL.model_copy(update={"regression": learner})
     with pytest.raises(ValueError, match="feature_names has no 'mood'"):
-        RegressionTrainer(drives, drives, PRICE, config, lambda policy: 0.0, tmp_path)
+        RegressionTrainer(drives, drives, config, lambda policy: 0.0, tmp_path)
 
 
 def test_a_fit_tells_what_actions_are_worth_beside_each_other():
@@ -133,7 +133,7 @@ def drives():
 
 
 def trainer(drives, out, validate=lambda policy: 0.0, config=SMALL):
-    return RegressionTrainer(*drives, PRICE, config, validate, out)
+    return RegressionTrainer(*drives, config, validate, out)
 
 
 def test_an_interrupted_regression_goes_on_to_the_same_end(drives, tmp_path):
@@ -210,7 +210,6 @@ def test_one_scheduler_beats_every_fixed_choice_at_every_price(tmp_path):
     RegressionTrainer(
         training,
         judging,
-        PRICE,
         config,
         lambda policy: judging.mean_return(policy, prices),
         tmp_path,

@@ -16,6 +16,7 @@ from agents.policies.learned import NetworkPolicy
 from agents.training.checkpoint import CHECKPOINT
 from agents.training.ppo import PpoTrainer
 from agents.training.sb3_vector import Sb3VecEnv, split_infos
+from shotenv.config.keywords import env_config
 
 AGENTS = Path(agents.__file__).parent
 FRAMES = 16
@@ -170,7 +171,7 @@ def test_checkpoints_of_other_prices_are_refused(tmp_path):
     with pytest.raises(ValueError, match="another configuration"):
         PpoTrainer(
             *(Sb3VecEnv(make_envs()), NAMES, FRAMES, CONFIG, validate, tmp_path),
-            power_price=(0.01, 0.2),
+            env=env_config(reward={"power": (0.01, 0.2)}),
         ).run()
 
 
