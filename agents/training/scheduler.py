@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from agents.config import DemoConfig
-from agents.evaluation import drive_seeds, make_envs
+from agents.evaluation import FIXED_POLICIES, drive_seeds, make_envs
 from agents.policies import NetworkPolicy
 from agents.training.branching import Branches
 from agents.training.checkpoint import Validate, training_drives
@@ -83,14 +83,26 @@ def rescore(
     prices: Sequence[float],
     out: Path,
 ) -> None:
-    """Say and write what the kept policy reaches on drives that did not choose it.
+    """Say and write what the kept policy gains on drives that did not choose it.
 
-    The best of many rounds is in part the luckiest on the drives that it is chosen by.
+    The best of many rounds is in part the luckiest on the drives that it is chosen by. Some drives
+    are easier than others: told is what is gained over the best fixed choice on the same drives.
     """
-    chose, rest = (drives.mean_return(policy, prices) for drives in (judging, others))
-    told = {"return_on_drives_that_chose": chose, "return_on_others": rest, "prices": list(prices)}
+    chose, rest = (gain_over_fixed(policy, drives, prices) for drives in (judging, others))
+    told = {"gain_on_drives_that_chose": chose, "gain_on_others": rest, "prices": list(prices)}
     write_json(out / VALIDATION, told)
-    say(f"validation return {chose:.1f} on the drives that chose the policy, {rest:.1f} on others")
+    say(
+        f"return beyond the best fixed choice: {chose:.1f} on the validation drives that chose the "
+        f"policy, {rest:.1f} on others"
+    )
+
+
+def gain_over_fixed(policy: NetworkPolicy, drives: Branches, prices: Sequence[float]) -> float:
+    """Mean return beyond that of the best fixed choice at each of the `prices`."""
+    fixed = [
+        max(drives.mean_return(one, [price]) for one in FIXED_POLICIES.values()) for price in prices
+    ]
+    return drives.mean_return(policy, prices) - float(np.mean(fixed))
 
 
 def ppo_trainer(env: EnvConfig, config: DemoConfig, validate: Validate, out: Path) -> PpoTrainer:

@@ -117,8 +117,8 @@ def test_every_learner_trains_by_the_same_command(capsys, tmp_path, tiny, algori
     told = load_policy(tmp_path).provenance
     assert told.algorithm == algorithm and told.power_price == (0.01, 0.35)
     rescored = json.loads((tmp_path / "validation.json").read_text())
-    chose, others = rescored["return_on_drives_that_chose"], rescored["return_on_others"]
-    assert f"{chose:.1f} on the drives that chose the policy, {others:.1f} on others" in err
+    chose, others = rescored["gain_on_drives_that_chose"], rescored["gain_on_others"]
+    assert f"{chose:.1f} on the validation drives that chose the policy, {others:.1f} on" in err
     assert chose != others and len(rescored["prices"]) == 4
 
 
