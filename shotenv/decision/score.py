@@ -50,8 +50,8 @@ ZERO, FOUR_SIGMA = np.float32(0.0), np.float32(4.0)
 SUMMED = 64
 """Pixels of a small map that are summed side by side: rows of this length at most."""
 CLOSE_M = np.float32(0.1)
-"""Above the noise of well lit pixels, far below half an unambiguous range (3 m); the limit of the
-depth metric of this name, too, and 1 % of 10 m, what such sensors are often specified to [assumed]."""
+"""Above the noise of well lit pixels, far below half an unambiguous range (3 m): 1 % of 10 m,
+what such sensors are often specified to [assumed]; the limit of the depth metric of this name."""
 FARTHEST_ERROR_M = np.float32(1e9)
 """Stands for the error where there is no distance: its term is 1 within the rounding of a float."""
 
