@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -30,9 +30,11 @@ class PlayedDrives:
         Seeds of the drives.
     shots : int64 [N, T]
         Samples taken; 0 where the laser was off.
-    reward, laser_energy_j, energy_j, life_used_h, depth_mae_m, wrap_accuracy, temperature_k : \
-float64 [N, T]
-        As in the environment's `info`; error and wrap accuracy are NaN where the laser was off.
+    reward, laser_energy_j, energy_j, life_used_h, depth_mae_m, wrap_accuracy, within_0p1m, \
+temperature_k : float64 [N, T]
+        As in the environment's `info`; error and shares of pixels are NaN where the laser was off.
+    temporal_error_m : float64 [N, T]
+        NaN where it is not known: before `with_temporal_errors`; and see there.
     family : str [N, T]
         Scene family of the frame.
     clip : int64 [N, T]
@@ -52,6 +54,8 @@ float64 [N, T]
     life_used_h: np.ndarray
     depth_mae_m: np.ndarray
     wrap_accuracy: np.ndarray
+    within_0p1m: np.ndarray
+    temporal_error_m: np.ndarray
     temperature_k: np.ndarray
     family: np.ndarray
     clip: np.ndarray
@@ -75,8 +79,10 @@ float64 [N, T]
             "energy_j": self.energy_j.sum(axis=1),
             "life_used_h": self.life_used_h.sum(axis=1),
             # Over frames with laser: one without has no depth. The return counts it in full.
-            "depth_mae_m": np.nanmean(self.depth_mae_m, axis=1),
-            "wrap_accuracy": np.nanmean(self.wrap_accuracy, axis=1),
+            "depth_mae_m": mean_known(self.depth_mae_m),
+            "wrap_accuracy": mean_known(self.wrap_accuracy),
+            "within_0p1m": mean_known(self.within_0p1m),
+            "temporal_error_m": mean_known(self.temporal_error_m),
             "tripped_share": np.mean(self.shots == 0, axis=1),
         }
 
@@ -88,28 +94,63 @@ float64 [N, T]
         """
         frames = self.shots.shape[1]
         lit = self.shots > 0
-        sums = {
-            "return": frames * self.reward,
-            "laser_energy_j": frames * self.laser_energy_j,
-            "energy_j": frames * self.energy_j,
-            "life_used_h": frames * self.life_used_h,
-            "depth_mae_m": np.where(lit, self.depth_mae_m, 0.0),
-            "wrap_accuracy": np.where(lit, self.wrap_accuracy, 0.0),
-            "tripped_share": (~lit).astype(float),
-        }
-        every, with_depth = (by_clip(one.astype(float), self.clip) for one in (lit | ~lit, lit))
+        every, pairs = np.ones_like(lit), ~np.isnan(self.temporal_error_m)
         # Over frames with laser: one without has no depth. The return counts it in full.
-        of_depth = ("depth_mae_m", "wrap_accuracy")
-        return {
-            name: (by_clip(values, self.clip), with_depth if name in of_depth else every)
-            for name, values in sums.items()
+        counted = {
+            "return": (frames * self.reward, every),
+            "laser_energy_j": (frames * self.laser_energy_j, every),
+            "energy_j": (frames * self.energy_j, every),
+            "life_used_h": (frames * self.life_used_h, every),
+            "depth_mae_m": (self.depth_mae_m, lit),
+            "wrap_accuracy": (self.wrap_accuracy, lit),
+            "within_0p1m": (self.within_0p1m, lit),
+            "temporal_error_m": (self.temporal_error_m, pairs),
+            "tripped_share": (~lit, every),
         }
+        return {
+            name: (
+                by_clip(np.where(where, values, 0.0), self.clip),
+                by_clip(where.astype(float), self.clip),
+            )
+            for name, (values, where) in counted.items()
+        }
+
+    def with_temporal_errors(self, of_actions: np.ndarray) -> PlayedDrives:
+        """The same with the temporal error of what was taken.
+
+        Parameters
+        ----------
+        of_actions : float64 [N, T, 3, 3]
+            Of these drives; see `tabulate_temporal_errors`. None is known, too, where the laser was
+            off in a frame or the one before.
+        """
+        drive, frame = np.indices(self.shots[:, 1:].shape)
+        action, lit = np.searchsorted(list(Shots), self.shots), self.shots > 0
+        error_m = np.full(self.shots.shape, np.nan)
+        error_m[:, 1:] = np.where(
+            lit[:, :-1] & lit[:, 1:],
+            of_actions[drive, frame + 1, action[:, :-1], action[:, 1:]],
+            np.nan,
+        )
+        return replace(self, temporal_error_m=error_m)
 
     def shots_share(self, family: str | None = None) -> list[float]:
         """Share of 2, 4 and 8 shots among the frames with laser, of one family or of all."""
         counted = self.shots if family is None else self.shots[self.family == family]
         total = max(int(np.count_nonzero(counted)), 1)
         return [float(np.count_nonzero(counted == shots) / total) for shots in Shots]
+
+
+def mean_known(values: np.ndarray) -> np.ndarray:
+    """Means [N] over the values [N, T] that are not NaN; NaN where all are.
+
+    Examples
+    --------
+    >>> mean_known(np.array([[1.0, np.nan, 2.0], [np.nan, np.nan, np.nan]]))
+    array([1.5, nan])
+    """
+    known = np.count_nonzero(~np.isnan(values), axis=1)
+    return np.where(known > 0, np.nansum(values, axis=1) / np.maximum(known, 1), np.nan)
 
 
 def make_envs(config: EnvConfig, split: str, count: int, mode: str) -> ShotScheduleVectorEnv:
@@ -178,6 +219,8 @@ def play_drives(
                 "life_used_h": np.array(told["life_used_h"]),
                 "depth_mae_m": np.where(off, np.nan, told["depth_mae_m"]),
                 "wrap_accuracy": np.where(off, np.nan, told["wrap_accuracy"]),
+                "within_0p1m": np.where(off, np.nan, told["within_0p1m"]),
+                "temporal_error_m": np.full(len(seeds), np.nan),
                 "temperature_k": np.array(told["temperature_k"]),
                 "family": families[told["family"]],
                 "reward_per_price": scale * (power_of_four - told["reward_terms"]["power"]),

@@ -28,7 +28,7 @@ from agents.evaluation.price_sweep import (
 )
 from agents.evaluation.summary import summary
 from agents.evaluation.tuning import Tuned, tune, tuning_envs
-from agents.optimum import by_clip, tabulate
+from agents.optimum import by_clip, tabulate, tabulate_temporal_errors
 from agents.policies import (
     FAMILIES_OF_PRACTICE,
     NetworkPolicy,
@@ -101,10 +101,16 @@ def play_all(
 ) -> dict[str, PlayedDrives]:
     """Every policy on the same drives, each at the drive's own price."""
     seeds = drive_seeds(study, study.drives)
+    unwrapped: Any = envs.unwrapped  # gymnasium's annotation does not know our attributes
+    problem = unwrapped.problem
+    frames = len(seeds) * problem.config.frames_per_drive
+    with progress(frames, f"pairs of actions on {study.split} drives", "frame") as bar:
+        temporal_errors = tabulate_temporal_errors(problem, seeds, tick=bar.update)
     with progress(len(policies), f"policies on {study.split} drives", "policy") as bar:
         played = {}
         for name, policy in policies.items():
-            played[name] = play_drives(policy, envs, seeds)
+            one = play_drives(policy, envs, seeds)
+            played[name] = one.with_temporal_errors(temporal_errors)
             bar.update(1)
         return played
 

@@ -58,7 +58,7 @@ def summary(
         "policies": {
             name: {
                 **{
-                    measure: study_interval(ratio, study, total, count).named("mean")
+                    measure: mean_interval(total, count, study)
                     for measure, (total, count) in one.per_clip().items()
                 },
                 "shots_share": one.shots_share(),
@@ -86,6 +86,19 @@ def summary(
             for name, one in played.items()
         },
     }
+
+
+def mean_interval(
+    total: np.ndarray, count: np.ndarray, study: StudyConfig
+) -> dict[str, float] | None:
+    """Mean of what adds up to `total` [C] in `count` [C] frames of each clip, with its interval.
+
+    Clips without any such frame tell nothing of it. None where it is known of fewer than two.
+    """
+    there = count > 0
+    if np.count_nonzero(there) < 2:
+        return None
+    return study_interval(ratio, study, total[there], count[there]).named("mean")
 
 
 def difference(one: PlayedDrives, other: PlayedDrives, study: StudyConfig) -> Interval:

@@ -14,3 +14,7 @@ from .fronts import (
 )
 from .outcome_table import DriveTable as DriveTable, PlayedTable as PlayedTable, play as play
 from .tabulation import Possible as Possible, drive_of as drive_of, tabulate as tabulate
+from .temporal_error import (
+    STILL_M as STILL_M,
+    tabulate_temporal_errors as tabulate_temporal_errors,
+)

@@ -11,6 +11,7 @@ import jinja2
 import numpy as np
 from plotly.offline import get_plotlyjs
 
+from agents.optimum import STILL_M
 from agents.report import charts
 from agents.report.answer import (
     best_rule,
@@ -89,6 +90,7 @@ def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip | 
         drive=played["drive"],
         split=results["config"]["study"]["split"],
         price=_price(results),
+        still_m=STILL_M,
         shot_colors={str(shots): color for shots, color in charts.SHOT_COLORS.items()},
         plotly=get_plotlyjs(),  # all 4 MB of it: the page is read without a network
     )
@@ -104,6 +106,7 @@ def _rows(results: dict[str, Any]) -> list[dict[str, Any]]:
             "fixed": name == results["best_fixed"],
             "paired": results["paired_to_best_fixed"].get(name),
             "rule": None,  # where the policy has none of its own
+            "temporal_error_m": None,  # where it is not known
             **policy,
         }
         for name, policy in ordered

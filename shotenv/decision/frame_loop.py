@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shotenv.decision.score import score_pixels_, sum_pixels_
+from shotenv.decision.score import SCORES, score_pixels_, sum_pixels_
 from shotenv.sensor import (
     BLOCK,
     GrayNoise,
@@ -109,7 +109,7 @@ class Room(NamedTuple):
         Noise, amplitude and residual at f1, the latter at f2; saturated, scored, valid.
     distances : [3, 1, H, W]
         Of the first two, the first four and all samples.
-    score, sums : [5, 1], [8, 1]
+    score, sums : [6, 1], [8, 1]
     """
 
     words: Array
@@ -158,7 +158,7 @@ def room_for(rows: int, columns: int) -> Room:
         cosine2_row=cosine2.reshape(-1),
         distances=np.empty((3, 1, rows, columns), np.float32),
         masks=np.empty((3, *one), np.bool_),
-        score=np.empty((5, 1)),
+        score=np.empty((len(SCORES), 1)),
         sums=np.empty((8, 1)),
     )
 
@@ -188,7 +188,7 @@ def _frame_loop(stamp: int) -> Callable[..., bool]:
             Frames of the batch that are worked on: threads share a batch.
         room : Room
             To write in; each thread has its own.
-        score, error_of_four, sums : float64 [5, B], [B], [8, B]
+        score, error_of_four, sums : float64 [6, B], [B], [8, B]
             Fields of `DepthScore`, the error term of 4 DCS with an undiminished laser, and fields
             of `features.Sums` but the pixels. Written; score and sums not where no sample is taken.
 

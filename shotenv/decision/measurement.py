@@ -16,7 +16,7 @@ from shotenv.decision.drive import Drive
 from shotenv.decision.features import SEEN_FEATURES, TOLD, Sums, evaluated
 from shotenv.decision.frame_loop import Chain, FramesTaken, room_for, score_frames_
 from shotenv.decision.problem import Problem
-from shotenv.decision.score import SUMMED, DepthScore, no_depth, score_depth, sum_pixels_
+from shotenv.decision.score import SCORES, SUMMED, DepthScore, no_depth, score_depth, sum_pixels_
 from shotenv.decision.state import State
 from shotenv.sensor import gray_noise, incident_light, pixel_of, row_parity, sensitivity
 from unwrap.depth import RULES, dual_limits, merge_limits, shift_in_turns, turns_table
@@ -114,7 +114,8 @@ def _measured_by_loop(
         shift1=shift_in_turns(0, problem.description, drive.drift_m, len(step)),
         shift2=shift_in_turns(1, problem.description, drive.drift_m, len(step)),
     )
-    score, error_of_four, sums = (np.zeros((*size, len(step))) for size in ((5,), (), (8,)))
+    sizes = (len(SCORES),), (), (8,)
+    score, error_of_four, sums = (np.zeros((*size, len(step))) for size in sizes)
     chain, (rows_, columns) = chain_of(problem), taken.truth_m.shape[1:]
     finite = in_parts(
         lambda begin, end: score_frames_(

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import torch
 from torch import Tensor
 
 from shotenv.decision.drive import Drive
 from shotenv.decision.measurement import Measurement, measure_frames
 from shotenv.decision.problem import Problem
-from shotenv.decision.score import DepthScore
+from shotenv.decision.score import SCORES, DepthScore
 from unwrap.support import take
 
-SCORES = tuple(field.name for field in dataclasses.fields(DepthScore))
 MOST_KEPT = 500_000
 """Frames, counted once for each number of samples, that a cache keeps: some 0.3 GB, or all
 choices in 650 drives of 256 frames."""

@@ -19,6 +19,7 @@ TOLD = (
     "depth_rmse_m",
     "wrap_accuracy",
     "valid_share",
+    "within_0p1m",
     "tripped",
     "cost",
     "vector_reward",

@@ -98,6 +98,7 @@ INFO_ENTRIES = (
     Entry("depth_rmse_m", "m", "root of the mean square error of the valid scored pixels", lambda p: p.outcome.score.depth_rmse_m, 0.0),
     Entry("wrap_accuracy", "1", "share of the scored pixels that is valid and in the right wrap", lambda p: p.outcome.score.wrap_accuracy, 0.0),
     Entry("valid_share", "1", "share of the scored pixels that is valid", lambda p: p.outcome.score.valid_share, 0.0),
+    Entry("within_0p1m", "1", "share of the scored pixels that is valid and errs by less than 0.1 m", lambda p: p.outcome.score.within_0p1m, 0.0),
     Entry("tripped", "bool", "the laser was off", lambda p: p.outcome.tripped, False),
     Entry("cost", "1", "constraint violation: 1 without laser or above the cap for eyes, else 0", lambda p: violated(p).double(), 0.0),
 )

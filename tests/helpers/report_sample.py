@@ -96,6 +96,8 @@ def made_up_results(
             "life_used_h": made_up_interval(2e-3 * shots, 2e-4),
             "depth_mae_m": made_up_interval(1.2 / shots + 0.1, 0.02),
             "wrap_accuracy": made_up_interval(0.93, 0.01),
+            "within_0p1m": made_up_interval(0.5, 0.02),
+            "temporal_error_m": made_up_interval(0.8 / shots, 0.02),
             "tripped_share": made_up_interval(0.01 * shots, 0.005),
             "shots_share": shares[name],
             "life_factor": made_up_interval(8.0 / shots, 0.1),

@@ -147,6 +147,8 @@ def made_up_played(rewards):
         energy_j=2 * ones,
         depth_mae_m=0.1 * ones,
         wrap_accuracy=0.9 * ones,
+        within_0p1m=0.4 * ones,
+        temporal_error_m=0.2 * ones,
         temperature_k=300 * ones,
         family=np.full(shape, "garage"),
         clip=np.broadcast_to(np.arange(shape[0])[:, None] // 2, shape),
@@ -175,6 +177,33 @@ def test_summary_pairs_every_policy_with_the_best_fixed_choice():
     assert results["policies"]["scheduler"]["laser_wh_per_h"] == pytest.approx(2.0)
     assert results["policies"]["scheduler"]["life_factor"]["mean"] == pytest.approx(1.0)
     assert difference(played["scheduler"], played["scheduler"], study).value == 0.0
+
+
+def test_temporal_errors_are_looked_up_by_the_shots_of_both_frames():
+    made_up = made_up_played(np.zeros((1, 5)))
+    played = dataclasses.replace(made_up, shots=np.array([[2, 8, 0, 4, 4]]))
+    # Metres that tell frame, action before and action now.
+    of_actions = np.add.outer(
+        10.0 * np.arange(5), [[0.0, 0.1, 0.2], [1.0, 1.1, 1.2], [2, 2.1, 2.2]]
+    )
+    found = played.with_temporal_errors(of_actions[None])
+    np.testing.assert_allclose(found.temporal_error_m, [[np.nan, 10.2, np.nan, np.nan, 41.1]])
+    assert found.per_drive["temporal_error_m"] == pytest.approx([(10.2 + 41.1) / 2])
+    total, count = found.per_clip()["temporal_error_m"]
+    assert total == pytest.approx([51.3]) and count.tolist() == [2.0]
+
+
+def test_of_clips_that_know_a_measure_not_the_interval_is_that_of_the_others():
+    study = StudyConfig(bootstrap_draws=200)
+    played = made_up_played(np.zeros((8, 3)))
+    error_m = np.repeat([0.1, 0.3, 0.2, np.nan], 2)[:, None] * np.ones((8, 3))
+    few = {n: dataclasses.replace(played, temporal_error_m=error_m) for n in FIXED_POLICIES}
+    none = dataclasses.replace(played, temporal_error_m=np.full((8, 3), np.nan))
+    results = summary({**few, "rule": none}, study, scheduler="rule", drive_s=2.0)["policies"]
+    known = results["always_2"]["temporal_error_m"]
+    assert known["mean"] == pytest.approx(0.2) and 0.09 < known["low"] < known["high"] < 0.31
+    assert results["rule"]["temporal_error_m"] is None
+    assert results["rule"]["within_0p1m"]["mean"] == pytest.approx(0.4)
 
 
 def test_tails_tell_what_means_hide():
@@ -274,7 +303,11 @@ def test_train_and_evaluate_write_everything_the_report_needs(config, tmp_path):
         *("agent", "results.json", "drives.csv", "timeline.json", "frames.npz", "report.html")
     }
     assert json.loads((tmp_path / "results.json").read_text()) == evaluation.results
+    for policy in results["policies"].values():
+        assert 0.0 < policy["within_0p1m"]["mean"] <= policy["wrap_accuracy"]["mean"]
+        assert policy["temporal_error_m"]["mean"] > 0.0
     rows = (tmp_path / "drives.csv").read_text().splitlines()
+    assert "within_0p1m,temporal_error_m" in rows[0]
     assert len(rows) == 1 + len(evaluation.played) * len(SEEDS)
     with pytest.raises(ValueError, match="other features"):
         evaluate_scheduler(config, scheduler_of(None, ("heat_margin",)))

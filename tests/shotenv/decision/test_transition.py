@@ -59,6 +59,17 @@ def test_score_by_hand():
     assert found.depth_rmse_m.item() == pytest.approx(((0.25 + 49) / 2) ** 0.5)
     assert found.wrap_accuracy.item() == pytest.approx(1 / 4)
     assert found.valid_share.item() == pytest.approx(2 / 4)
+    assert found.within_0p1m.item() == 0.0
+
+
+def test_close_are_pixels_that_are_valid_and_err_by_less_than_ten_centimetres():
+    found = score(
+        [2.09, 1.91, 2.11, 2.0, 2.0],
+        [True, True, True, False, True],
+        [2.0, 2.0, 2.0, 2.0, 2.0],
+        [True, True, True, True, False],
+    )
+    assert found.within_0p1m.item() == 2 / 4
 
 
 def test_maps_of_different_shapes_are_not_scored():
@@ -68,7 +79,8 @@ def test_maps_of_different_shapes_are_not_scored():
 
 def test_a_frame_without_scored_pixels_costs_nobody_anything():
     found = score([1.0, 2.0], [True, False], [9.0, 9.0], [False, False])
-    assert found.error.item() == 0.0 and found.valid_share.item() == 1.0
+    assert found.error.item() == 0.0
+    assert found.valid_share.item() == found.within_0p1m.item() == 1.0
 
 
 def cost_where(one, **values):
@@ -122,6 +134,8 @@ def test_scores_are_those_of_a_slow_loop_over_the_batch():
         assert found.depth_rmse_m[b].item() == pytest.approx(squares.item(), rel=1e-6)
         right = (good & (errors < 3.125)).sum() / counted[b].sum()
         assert found.wrap_accuracy[b].item() == pytest.approx(right.item(), rel=1e-6)
+        close = (good & (errors < 0.1)).sum() / counted[b].sum()
+        assert found.within_0p1m[b].item() == pytest.approx(close.item(), rel=1e-6)
         share = good.sum() / counted[b].sum()
         assert found.valid_share[b].item() == pytest.approx(share.item(), rel=1e-6)
 

@@ -24,6 +24,7 @@ TOLD = {
     "depth_rmse_m",
     "wrap_accuracy",
     "valid_share",
+    "within_0p1m",
     "reward_terms",
     "vector_reward",
     "cost",

@@ -79,7 +79,7 @@ def test_scores_and_features_are_those_of_the_python_loops(draw):
     truth_m, distance_m = draw(frames, 0.0, 25.0), draw(frames, 0.0, 25.0)
     distance_m[0, 0, :3] = np.nan
     valid, scored, saturated = (draw(frames) < 0.7 for _ in range(3))
-    found = [np.empty((5, 2)) for _ in range(2)]
+    found = [np.empty((6, 2)) for _ in range(2)]
     for score, into in zip((score_pixels_, score_pixels_.py_func), found, strict=True):
         scale_m, near_m = np.float32(0.5), np.float32(3.0)
         score(distance_m, valid, truth_m, scored, scale_m, near_m, 25.0, into)
