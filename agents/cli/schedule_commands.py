@@ -75,10 +75,10 @@ def evaluate_arguments(parser: ArgumentParser) -> None:
 def evaluate(arguments: Namespace) -> int:
     """Judge a trained scheduler."""
     from agents.evaluation import check_study, evaluate_scheduler
-    from agents.policies import NetworkPolicy
+    from agents.policies import load_policy
 
     # Loaded first: a folder without a scheduler is refused before a bank is rendered.
-    scheduler, config = NetworkPolicy.load(arguments.scheduler), experiment_of(arguments)
+    scheduler, config = load_policy(arguments.scheduler), experiment_of(arguments)
     check_study(config, scheduler)
     prepare_bank(config.env)
     play_on_one_thread()
@@ -151,7 +151,7 @@ COMMANDS = (
     ),
     Command(
         "train",
-        "train a scheduler with PPO, DQN, QR-DQN or a regression",
+        "train a scheduler with PPO, RecurrentPPO, DQN, QR-DQN or a regression",
         train_arguments,
         train,
         resumes=True,

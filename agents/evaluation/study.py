@@ -31,10 +31,10 @@ from agents.evaluation.tuning import Tuned, tune, tuning_envs
 from agents.optimum import by_clip, tabulate
 from agents.policies import (
     FAMILIES_OF_PRACTICE,
-    NetworkPolicy,
     Policy,
     PolicyFamily,
     RandomPolicy,
+    Scheduler,
 )
 from shotenv.config import EnvConfig
 from shotenv.decision import FEATURE_NAMES, Problem, open_problem
@@ -110,7 +110,7 @@ def play_all(
 
 
 def play_fronts(
-    scheduler: NetworkPolicy,
+    scheduler: Scheduler,
     tuned: Mapping[str, Mapping[float, Tuned]],
     envs: VectorEnv,
     config: DemoConfig,
@@ -143,7 +143,7 @@ def play_fronts(
         return fronts
 
 
-def evaluate_scheduler(config: DemoConfig, scheduler: NetworkPolicy) -> Evaluation:
+def evaluate_scheduler(config: DemoConfig, scheduler: Scheduler) -> Evaluation:
     """Judge `scheduler` beside the policies of practice and the optimum; nothing is written.
 
     Raises
@@ -211,7 +211,7 @@ def table_fronts(problem: Problem, study: StudyConfig) -> tuple[PlayedFront | No
     return optimum, by_clip(eight_m, possible.clips())
 
 
-def check_study(config: DemoConfig, scheduler: NetworkPolicy) -> None:
+def check_study(config: DemoConfig, scheduler: Scheduler) -> None:
     """Refuse what cannot be judged, before anything is played.
 
     Raises
@@ -228,7 +228,7 @@ def check_study(config: DemoConfig, scheduler: NetworkPolicy) -> None:
     prices_of(scheduler, config.study.prices)
 
 
-def warn_of_prices(config: DemoConfig, scheduler: NetworkPolicy) -> None:
+def warn_of_prices(config: DemoConfig, scheduler: Scheduler) -> None:
     """Say which prices the scheduler was not trained for, and that it has no knob."""
     if scheduler.provenance.power_price is None:
         return
