@@ -249,7 +249,7 @@ def warn_of_prices(config: DemoConfig, scheduler: Scheduler) -> None:
         )
 
 
-def warn_of_environment(env: EnvConfig, scheduler: NetworkPolicy) -> None:
+def warn_of_environment(env: EnvConfig, scheduler: Scheduler) -> None:
     """Say in what the environment differs from that of the training, where that is known."""
     trained = scheduler.provenance.environment
     # Prices are warned of elsewhere, and splits always differ.
