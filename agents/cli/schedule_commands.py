@@ -68,6 +68,12 @@ def train(arguments: Namespace) -> int:
 def evaluate_arguments(parser: ArgumentParser) -> None:
     """Which scheduler, the experiment, and where its results go."""
     parser.add_argument("scheduler", type=Path, help="folder of a trained scheduler")
+    parser.add_argument(
+        "--budget",
+        type=float,
+        metavar="J",
+        help="judge all, too, at this laser energy per drive on average, beside the optimum at it",
+    )
     add_experiment(parser)
     add_out(parser, "runs/evaluation", "folder of the results and the report")
 
@@ -82,18 +88,19 @@ def evaluate(arguments: Namespace) -> int:
     check_study(config, scheduler)
     prepare_bank(config.env)
     play_on_one_thread()
-    return publish(arguments, config, evaluate_scheduler(config, scheduler))
+    found = evaluate_scheduler(config, scheduler, budget_j=arguments.budget)
+    return publish(arguments, config, found)
 
 
 def publish(arguments: Namespace, config: DemoConfig, evaluation: Evaluation) -> int:
     """Write the results and their page into `--out`, and say what they say."""
-    from agents.report import details, verdict, write_evaluation, write_report
+    from agents.report import budget_lines, details, verdict, write_evaluation, write_report
 
     results = evaluation.results
     write_evaluation(evaluation, config, arguments.out)
     page = write_report(arguments.out)
     write_numbers(arguments, results)
-    told = "\n".join((verdict(results), *details(results)))
+    told = "\n".join((verdict(results), *details(results), *budget_lines(results)))
     print(f"\n{told}\n\nReport: {page.resolve()}")
     return DONE
 
