@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from jsonargparse import ArgumentParser, Namespace
 
-from agents.cli.command import DONE, Command, add_out, write_numbers
+from agents.cli.command import DONE, Command, add_out, add_trust, write_numbers
 from agents.cli.experiment import (
     add_experiment,
     experiment_of,
@@ -67,7 +67,8 @@ def train(arguments: Namespace) -> int:
 
 def evaluate_arguments(parser: ArgumentParser) -> None:
     """Which scheduler, the experiment, and where its results go."""
-    parser.add_argument("scheduler", type=Path, help="folder of a trained scheduler")
+    parser.add_argument("scheduler", type=Path, help="folder of a trained scheduler, or a zip")
+    add_trust(parser)
     parser.add_argument(
         "--budget",
         type=float,
@@ -84,7 +85,8 @@ def evaluate(arguments: Namespace) -> int:
     from agents.policies import load_policy
 
     # Loaded first: a folder without a scheduler is refused before a bank is rendered.
-    scheduler, config = load_policy(arguments.scheduler), experiment_of(arguments)
+    scheduler = load_policy(arguments.scheduler, trust=arguments.trust)
+    config = experiment_of(arguments)
     check_study(config, scheduler)
     prepare_bank(config.env)
     play_on_one_thread()

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from agents.policies.foreign_zips import network_of_zip
 from agents.policies.policy import Action, Observation, Policy, single
 from agents.policies.recurrent import RecurrentPolicy
 from agents.policies.scheduler_files import (
@@ -32,6 +33,7 @@ from agents.policies.score_networks import (
     score_network,
     widths_of,
 )
+from shotenv.decision import FEATURE_NAMES
 
 if TYPE_CHECKING:
     from stable_baselines3.common.policies import ActorCriticPolicy
@@ -147,15 +149,44 @@ Scheduler = NetworkPolicy | RecurrentPolicy
 """What `shotenv train` makes."""
 
 
-def load_policy(folder: str | Path) -> Scheduler:
-    """The policy that `shotenv train` saved in `folder`.
+def load_policy(path: str | Path, *, trust: bool = False) -> Scheduler:
+    """The policy that `shotenv train` saved in the folder `path`, or a zip of stable-baselines3.
+
+    Parameters
+    ----------
+    trust : bool
+        Whether a zip may be read. Nothing in it is run: its weights are read as tensors, and the
+        rest, which is pickled, is not. But it does not tell which features it was trained on, nor
+        in what environment.
 
     Raises
     ------
     ValueError
-        The folder holds no scheduler, one of another version, or a damaged one; the message names
-        the file.
+        The folder holds no scheduler, one of another version, or a damaged one; the path is a zip
+        that is not trusted, or not of PPO, A2C, DQN or QR-DQN on the features of this environment.
+        The message names the file.
     """
-    folder = Path(folder)
-    kind = RecurrentPolicy if read_description(folder / DESCRIPTION).memory else NetworkPolicy
-    return kind.load(folder)
+    path = Path(path)
+    if path.is_file():
+        return _load_zip(path, trust=trust)
+    kind = RecurrentPolicy if read_description(path / DESCRIPTION).memory else NetworkPolicy
+    return kind.load(path)
+
+
+def _load_zip(path: Path, *, trust: bool) -> NetworkPolicy:
+    if not trust:
+        raise ValueError(
+            f"{path} is a file; expected the folder of a scheduler. A zip of stable-baselines3 "
+            "holds pickles, which run whatever code they name when stable-baselines3 loads them, "
+            "and does not tell which features it was trained on. `--trust` takes it: its weights "
+            "alone are read, without running anything, as those of a network of the features here"
+        )
+    network, kind = network_of_zip(path)
+    # None of what else it tells can be checked; of its prices and versions it does not tell.
+    told = Provenance(algorithm=f"{kind}, {path.name}", feature_names=FEATURE_NAMES, versions={})
+    try:
+        return NetworkPolicy(network, told)
+    except ValueError as error:
+        raise ValueError(
+            f"{path} is of another environment: {error}, which are {', '.join(FEATURE_NAMES)}"
+        ) from None

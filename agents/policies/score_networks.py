@@ -94,9 +94,14 @@ def mean_quantile_network(network: Any) -> nn.Sequential:
     actions of the first quantile, then those of the second and so on.
     """
     _require_plain(network.features_extractor)
-    modules = list(_copy_of(*network.quantile_net))
+    return mean_of_quantiles(network.quantile_net, network.n_quantiles)
+
+
+def mean_of_quantiles(network: nn.Sequential, quantiles: int) -> nn.Sequential:
+    """The same network with the mean over the quantiles in its last layer; see there."""
+    modules = list(_copy_of(*network))
     last = cast(nn.Linear, modules[-1])
-    shape = network.n_quantiles, -1
+    shape = quantiles, -1
     # In float64, rounded once.
     weight = last.weight.double().reshape(*shape, last.in_features).mean(dim=0)
     mean = _linear(weight, last.bias.double().reshape(shape).mean(dim=0))
