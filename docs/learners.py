@@ -1,9 +1,9 @@
 """Trained schedulers beside fixed choices and tuned rules that look, at several prices of power.
 
-for learner in ppo dqn qrdqn regression; do
+for learner in ppo recurrent_ppo dqn qrdqn regression; do
     .venv/bin/shotenv train --agent configs/agent/$learner.yaml --out runs/$learner
 done
-.venv/bin/python docs/learners.py runs/ppo runs/dqn runs/qrdqn runs/regression
+.venv/bin/python docs/learners.py runs/ppo runs/recurrent_ppo runs/dqn runs/qrdqn runs/regression
 
 prints a table of mean returns on 48 test drives. Rules are tuned on 12 validation drives at each
 price; a scheduler is the same at all.

@@ -7,7 +7,7 @@ from pathlib import Path
 from jsonargparse import ArgumentParser, Namespace
 from jsonargparse.typing import NonNegativeInt, PositiveInt
 
-from agents.cli.command import DONE, Command, write_numbers
+from agents.cli.command import DONE, Command, add_trust, write_numbers
 from agents.cli.experiment import (
     add_experiment,
     experiment_of,
@@ -30,6 +30,7 @@ def collect_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--outcomes", type=bool, default=False, help="tell what every action would have brought"
     )
+    add_trust(parser)
     add_experiment(parser)
 
 
@@ -41,7 +42,8 @@ def collect(arguments: Namespace) -> int:
     from agents.evaluation import play_episodes, require_minari, write_dataset
 
     require_minari()  # before minutes are spent
-    policy, config = policy_of("policy", arguments.policy), experiment_of(arguments)
+    policy = policy_of("policy", arguments.policy, trust=arguments.trust)
+    config = experiment_of(arguments)
     prepare_bank(config.env)
     play_on_one_thread()
     env = gymnasium.make(

@@ -67,6 +67,15 @@ def add_out(parser: ArgumentParser, default: str, what: str) -> None:
     parser.add_argument("--out", type=Path, default=Path(default), metavar="DIR", help=what)
 
 
+def add_trust(parser: ArgumentParser) -> None:
+    """`--trust`, without which zips of stable-baselines3 are refused."""
+    parser.add_argument(
+        "--trust",
+        action="store_true",
+        help="take a zip of stable-baselines3 (PPO, A2C, DQN, QR-DQN): features are not checked",
+    )
+
+
 def write_numbers(arguments: Namespace, numbers: Any) -> None:
     """Write `numbers` to the file that `--json` names, if any."""
     if arguments.json is not None:

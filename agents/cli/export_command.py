@@ -6,7 +6,7 @@ import re
 
 from jsonargparse import ArgumentParser, Namespace
 
-from agents.cli.command import DONE, Command, add_json, add_out, write_numbers
+from agents.cli.command import DONE, Command, add_json, add_out, add_trust, write_numbers
 from shotenv.config import ConfigError
 from unwrap.support import write_json
 
@@ -18,7 +18,7 @@ def export_arguments(parser: ArgumentParser) -> None:
     """Which policy, and where its files go."""
     parser.add_argument(
         "policy",
-        help="folder of a trained scheduler, or cycle:PERIOD:SHOTS:OTHERWISE, as cycle:4:8:2",
+        help="folder of a trained scheduler, zip, or cycle:PERIOD:SHOTS:OTHERWISE, as cycle:4:8:2",
     )
     add_out(parser, "runs/export", "folder of the files")
     parser.add_argument("--c-only", action="store_true", help="no ONNX file, which needs onnx")
@@ -28,6 +28,7 @@ def export_arguments(parser: ArgumentParser) -> None:
         metavar="SHOTS=MODE",
         help="camera mode of each number of samples, for a cycle, as 8=3 2=1",
     )
+    add_trust(parser)
     add_json(parser)
 
 
@@ -41,7 +42,8 @@ def export(arguments: Namespace) -> int:
     from agents.deploy import export_policy
     from agents.policies import load_policy
 
-    found = export_policy(load_policy(arguments.policy), arguments.out, onnx=not arguments.c_only)
+    policy = load_policy(arguments.policy, trust=arguments.trust)
+    found = export_policy(policy, arguments.out, onnx=not arguments.c_only)
     cost = found["cost"]
     print(f"In {arguments.out}: {', '.join(found['files'])}.")
     print(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from jsonargparse import ArgumentParser, Namespace
 from jsonargparse.typing import NonNegativeFloat, NonNegativeInt
 
-from agents.cli.command import DONE, Command, write_numbers
+from agents.cli.command import DONE, Command, add_trust, write_numbers
 from agents.cli.experiment import (
     add_experiment,
     experiment_of,
@@ -70,6 +70,7 @@ def play_arguments(parser: ArgumentParser) -> None:
         default=4.0,
         help="frames per second; 0 waits for a key in every frame",
     )
+    add_trust(parser)
     add_experiment(parser)
 
 
@@ -78,7 +79,8 @@ def play(arguments: Namespace) -> int:
     from agents.evaluation import Match
     from shotenv.env import Window
 
-    rival, config = policy_of("against", arguments.against), experiment_of(arguments)
+    rival = policy_of("against", arguments.against, trust=arguments.trust)
+    config = experiment_of(arguments)
     env = config.env.model_copy(update={"split": config.study.split})
     window = Window(arguments.pace or POLLS_PER_S)
     try:
@@ -93,13 +95,13 @@ def play(arguments: Namespace) -> int:
     return DONE
 
 
-def policy_of(argument: str, name: str) -> Policy:
+def policy_of(argument: str, name: str, *, trust: bool = False) -> Policy:
     """The policy that `--argument` names.
 
     Raises
     ------
     ConfigError
-        It is neither random nor a fixed choice nor the folder of a scheduler.
+        It is neither random nor a fixed choice nor the folder or zip of a scheduler.
     """
     from agents.evaluation import FIXED_POLICIES
     from agents.policies import RandomPolicy, load_policy
@@ -107,10 +109,10 @@ def policy_of(argument: str, name: str) -> Policy:
     known: dict[str, Policy] = {"random": RandomPolicy(), **FIXED_POLICIES}
     if name in known:
         return known[name]
-    if not Path(name).is_dir():
+    if not Path(name).exists():
         listed = ", ".join(known)
         raise ConfigError(f"{argument} is {name!r}; expected {listed} or a scheduler's folder")
-    return load_policy(name)
+    return load_policy(name, trust=trust)
 
 
 def play_match(match: Match, window: Any, rival: str, *, waits: bool) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from jsonargparse import ArgumentParser, Namespace
 
-from agents.cli.command import DONE, Command, add_out, write_numbers
+from agents.cli.command import DONE, Command, add_out, add_trust, write_numbers
 from agents.cli.experiment import (
     add_experiment,
     experiment_of,
@@ -67,7 +67,14 @@ def train(arguments: Namespace) -> int:
 
 def evaluate_arguments(parser: ArgumentParser) -> None:
     """Which scheduler, the experiment, and where its results go."""
-    parser.add_argument("scheduler", type=Path, help="folder of a trained scheduler")
+    parser.add_argument("scheduler", type=Path, help="folder of a trained scheduler, or a zip")
+    add_trust(parser)
+    parser.add_argument(
+        "--budget",
+        type=float,
+        metavar="J",
+        help="judge all, too, at this laser energy per drive on average, beside the optimum at it",
+    )
     add_experiment(parser)
     add_out(parser, "runs/evaluation", "folder of the results and the report")
 
@@ -75,25 +82,27 @@ def evaluate_arguments(parser: ArgumentParser) -> None:
 def evaluate(arguments: Namespace) -> int:
     """Judge a trained scheduler."""
     from agents.evaluation import check_study, evaluate_scheduler
-    from agents.policies import NetworkPolicy
+    from agents.policies import load_policy
 
     # Loaded first: a folder without a scheduler is refused before a bank is rendered.
-    scheduler, config = NetworkPolicy.load(arguments.scheduler), experiment_of(arguments)
+    scheduler = load_policy(arguments.scheduler, trust=arguments.trust)
+    config = experiment_of(arguments)
     check_study(config, scheduler)
     prepare_bank(config.env)
     play_on_one_thread()
-    return publish(arguments, config, evaluate_scheduler(config, scheduler))
+    found = evaluate_scheduler(config, scheduler, budget_j=arguments.budget)
+    return publish(arguments, config, found)
 
 
 def publish(arguments: Namespace, config: DemoConfig, evaluation: Evaluation) -> int:
     """Write the results and their page into `--out`, and say what they say."""
-    from agents.report import details, verdict, write_evaluation, write_report
+    from agents.report import budget_lines, details, verdict, write_evaluation, write_report
 
     results = evaluation.results
     write_evaluation(evaluation, config, arguments.out)
     page = write_report(arguments.out)
     write_numbers(arguments, results)
-    told = "\n".join((verdict(results), *details(results)))
+    told = "\n".join((verdict(results), *details(results), *budget_lines(results)))
     print(f"\n{told}\n\nReport: {page.resolve()}")
     return DONE
 
@@ -151,7 +160,7 @@ COMMANDS = (
     ),
     Command(
         "train",
-        "train a scheduler with PPO, DQN, QR-DQN or a regression",
+        "train a scheduler with PPO, RecurrentPPO, DQN, QR-DQN or a regression",
         train_arguments,
         train,
         resumes=True,

@@ -2,6 +2,7 @@ from .agent import (
     AgentConfig as AgentConfig,
     DqnConfig as DqnConfig,
     PpoConfig as PpoConfig,
+    RecurrentConfig as RecurrentConfig,
     RegressionConfig as RegressionConfig,
 )
 from .demo import DemoConfig as DemoConfig

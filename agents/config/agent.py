@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Final, Literal
 
 from pydantic import Field, field_validator
 
 from unwrap.support import Fraction, NonNegative, Positive, Range, Section, check_range
 
-Algorithm = Literal["ppo", "dqn", "qrdqn", "regression"]
+Algorithm = Literal["ppo", "recurrent_ppo", "dqn", "qrdqn", "regression"]
+LEARNERS: Final = frozenset(("ppo", "recurrent", "dqn", "regression"))
+"""Sections of the learners."""
+SECTIONS: Final[dict[Algorithm, frozenset[str]]] = {
+    "ppo": frozenset(("ppo",)),
+    "recurrent_ppo": frozenset(("ppo", "recurrent")),
+    "dqn": frozenset(("dqn",)),
+    "qrdqn": frozenset(("dqn",)),
+    "regression": frozenset(("regression",)),
+}
+"""Which of them count for an algorithm."""
 
 
 class PpoConfig(Section):
-    """Proximal policy optimisation, by stable-baselines3."""
+    """Proximal policy optimisation, by stable-baselines3; with a memory by sb3-contrib."""
 
     total_steps: int = Field(65_536, ge=1, description="environment steps in all")
     num_envs: int = Field(16, ge=1, description="environments in the batch")
@@ -27,6 +37,14 @@ class PpoConfig(Section):
     entropy_coefficient: NonNegative = Field(0.005, description="weight of the policy's entropy")
     warm_start: bool = Field(
         True, description="whether to start from the known costs of all actions in the drives"
+    )
+
+
+class RecurrentConfig(Section):
+    """What RecurrentPPO has beside what `PpoConfig` tells."""
+
+    units: int = Field(
+        64, ge=1, le=1024, description="units of the LSTM that reads the features, one layer"
     )
 
 
@@ -86,8 +104,9 @@ class AgentConfig(Section):
 
     Attributes
     ----------
-    ppo, dqn, regression
-        Of each learner; that of the `algorithm` counts. DQN and QR-DQN share one.
+    ppo, recurrent, dqn, regression
+        Of each learner; those of the `algorithm` count. DQN and QR-DQN share one; RecurrentPPO has
+        that of PPO and `recurrent`.
     """
 
     algorithm: Algorithm = Field("ppo", description="which learner")
@@ -103,6 +122,7 @@ class AgentConfig(Section):
     seed: int = Field(0, ge=0, description="seed of weights and drives")
     tensorboard: bool = Field(False, description="whether to log for TensorBoard in the folder")
     ppo: PpoConfig = PpoConfig()
+    recurrent: RecurrentConfig = RecurrentConfig()
     dqn: DqnConfig = DqnConfig()
     regression: RegressionConfig = RegressionConfig()
 
@@ -118,7 +138,6 @@ class AgentConfig(Section):
         return power_price
 
     def told(self) -> dict[str, object]:
-        """What the run depends on, as JSON has it: of the learners that of the `algorithm`."""
-        section = "dqn" if self.algorithm == "qrdqn" else self.algorithm
-        others = {"ppo", "dqn", "regression", "tensorboard"} - {section}
-        return self.model_dump(mode="json", exclude=others)
+        """What the run depends on, as JSON has it: of the learners those of the `algorithm`."""
+        others = (LEARNERS - SECTIONS[self.algorithm]) | {"tensorboard"}
+        return self.model_dump(mode="json", exclude=set(others))

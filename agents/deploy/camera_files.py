@@ -12,7 +12,13 @@ from agents.deploy.agreement import CheckCases, different_actions, random_cases
 from agents.deploy.c_check import run_self_test
 from agents.deploy.c_source import HEADER, SOURCE, VECTORS, c_header, c_source, c_vectors
 from agents.deploy.onnx_policy import check_onnx, onnx_metadata, onnx_policy
-from agents.policies import NetworkPolicy, linear_layers, weights_in_blocks, widths_of
+from agents.policies import (
+    NetworkPolicy,
+    Scheduler,
+    linear_layers,
+    weights_in_blocks,
+    widths_of,
+)
 from unwrap.support import write_bytes, write_text
 
 ONNX: Final = "policy.onnx"
@@ -51,7 +57,7 @@ def cost_of_choice(policy: NetworkPolicy) -> Cost:
     return Cost(4 * values, 4 * (hidden + int(widths[-1])), products, hidden)
 
 
-def export_policy(policy: NetworkPolicy, out: Path, *, onnx: bool = True) -> dict[str, Any]:
+def export_policy(policy: Scheduler, out: Path, *, onnx: bool = True) -> dict[str, Any]:
     """Write `policy` as C files and, if asked for, ONNX into `out`; nothing where a check fails.
 
     Returns
@@ -62,10 +68,16 @@ def export_policy(policy: NetworkPolicy, out: Path, *, onnx: bool = True) -> dic
     Raises
     ------
     ValueError
-        A file chooses otherwise than torch.
+        A file chooses otherwise than torch, or `policy` has a memory of its own.
     OSError
         `out` cannot be written.
     """
+    if not isinstance(policy, NetworkPolicy):
+        raise ValueError(
+            f"the scheduler is a {type(policy).__name__}, which remembers what is in no "
+            "observation; expected a network of the features, as ppo, dqn, qrdqn and regression "
+            "train them"
+        )
     cases = random_cases(policy, CHECKED)
     files = {
         HEADER: c_header(policy),

@@ -17,7 +17,7 @@ from gymnasium.vector import VectorEnv
 
 from agents.evaluation.play import FIXED_POLICIES, PlayedDrives, play_drives
 from agents.optimum import Front, Possible, by_clip, clairvoyant
-from agents.policies import MixturePolicy, NetworkPolicy, Policy
+from agents.policies import MixturePolicy, Policy, Scheduler
 from unwrap.signal import Shots
 
 MIXTURES: Final = {
@@ -90,7 +90,7 @@ class PlayedFront:
         )
 
 
-def prices_of(scheduler: NetworkPolicy, prices: Sequence[float]) -> tuple[float, ...]:
+def prices_of(scheduler: Scheduler, prices: Sequence[float]) -> tuple[float, ...]:
     """Those of `prices` that a scheduler was trained for, rising.
 
     One that was trained at a single price, or does not observe it, has that price alone: turning

@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 
 from agents.config import DemoConfig, StudyConfig
+from agents.evaluation.budget import Plays, check_budget, judge_budget
 from agents.evaluation.front_measures import BLIND, OPTIMUM, compare_fronts
 from agents.evaluation.play import (
     FIXED_POLICIES,
@@ -31,10 +32,10 @@ from agents.evaluation.tuning import Tuned, tune, tuning_envs
 from agents.optimum import by_clip, tabulate, tabulate_temporal_errors
 from agents.policies import (
     FAMILIES_OF_PRACTICE,
-    NetworkPolicy,
     Policy,
     PolicyFamily,
     RandomPolicy,
+    Scheduler,
 )
 from shotenv.config import EnvConfig
 from shotenv.decision import FEATURE_NAMES, Problem, open_problem
@@ -116,7 +117,7 @@ def play_all(
 
 
 def play_fronts(
-    scheduler: NetworkPolicy,
+    scheduler: Scheduler,
     tuned: Mapping[str, Mapping[float, Tuned]],
     envs: VectorEnv,
     config: DemoConfig,
@@ -149,23 +150,35 @@ def play_fronts(
         return fronts
 
 
-def evaluate_scheduler(config: DemoConfig, scheduler: NetworkPolicy) -> Evaluation:
+def evaluate_scheduler(
+    config: DemoConfig, scheduler: Scheduler, *, budget_j: float | None = None
+) -> Evaluation:
     """Judge `scheduler` beside the policies of practice and the optimum; nothing is written.
+
+    Parameters
+    ----------
+    config : DemoConfig
+    scheduler : Scheduler
+    budget_j : float, optional
+        Laser energy per drive on average, J, with which all are judged, too.
 
     Raises
     ------
     ValueError
         The scheduler was trained on other features than the environment has, or with none of the
-        prices; or the study names a family that there is none of.
+        prices; the study names a family that there is none of; or no choice spends the budget.
     """
     study = config.study
     check_study(config, scheduler)
     warn_of_prices(config, scheduler)
     warn_of_environment(config.env, scheduler)
-    tuned = tune_families(config)
     # The same environments for all, which remember what they measured: noise depends on drive and
     # frame alone, so that policies that take the same shots of a frame share its cost.
     envs = make_envs(config.env, study.split, study.drives, "Disabled")
+    plays = Plays(envs, drive_seeds(study, study.drives))
+    if budget_j is not None:
+        check_budget(budget_j, plays)
+    tuned = tune_families(config)
     rules = {name: found[price_of(config.env)].policy for name, found in tuned.items()}
     policies = {
         SCHEDULER: scheduler,
@@ -189,6 +202,8 @@ def evaluate_scheduler(config: DemoConfig, scheduler: NetworkPolicy) -> Evaluati
     }
     shown = {**fronts, BLIND: blind} | ({OPTIMUM: optimum} if optimum else {})
     results["fronts"] = {name: front.rows for name, front in shown.items()}
+    if budget_j is not None:
+        results["budget"] = judge_budget(budget_j, config, scheduler, tuned, plays)
     results["algorithm"] = scheduler.provenance.algorithm
     # Every how many pixels each way: only of all of them there are images.
     results["every"] = problem.bank.every
@@ -217,7 +232,7 @@ def table_fronts(problem: Problem, study: StudyConfig) -> tuple[PlayedFront | No
     return optimum, by_clip(eight_m, possible.clips())
 
 
-def check_study(config: DemoConfig, scheduler: NetworkPolicy) -> None:
+def check_study(config: DemoConfig, scheduler: Scheduler) -> None:
     """Refuse what cannot be judged, before anything is played.
 
     Raises
@@ -234,7 +249,7 @@ def check_study(config: DemoConfig, scheduler: NetworkPolicy) -> None:
     prices_of(scheduler, config.study.prices)
 
 
-def warn_of_prices(config: DemoConfig, scheduler: NetworkPolicy) -> None:
+def warn_of_prices(config: DemoConfig, scheduler: Scheduler) -> None:
     """Say which prices the scheduler was not trained for, and that it has no knob."""
     if scheduler.provenance.power_price is None:
         return
@@ -255,7 +270,7 @@ def warn_of_prices(config: DemoConfig, scheduler: NetworkPolicy) -> None:
         )
 
 
-def warn_of_environment(env: EnvConfig, scheduler: NetworkPolicy) -> None:
+def warn_of_environment(env: EnvConfig, scheduler: Scheduler) -> None:
     """Say in what the environment differs from that of the training, where that is known."""
     trained = scheduler.provenance.environment
     # Prices are warned of elsewhere, and splits always differ.

@@ -5,6 +5,12 @@ from .choices import (
     blind_choices as blind_choices,
     threshold as threshold,
 )
+from .constrained import (
+    MOST_TRIED as MOST_TRIED,
+    ConstrainedOptimum as ConstrainedOptimum,
+    bracket as bracket,
+    constrained_optimum as constrained_optimum,
+)
 from .dynamic import clairvoyant as clairvoyant, greedy as greedy
 from .fronts import (
     Front as Front,

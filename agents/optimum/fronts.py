@@ -106,7 +106,19 @@ class Front:
         corners = self.corners(weight)
         error = self.means(weight)[1][corners]
         # `interp` wants rising numbers, and errors fall along the corners.
-        place = np.interp(-depth_mae_m, -error, np.arange(len(corners)))
+        return self._mixed(corners, np.interp(-depth_mae_m, -error, np.arange(len(corners))))
+
+    def mixture_spending(self, energy: float, weight: np.ndarray) -> np.ndarray:
+        """Share of time of each point, [L], where the mean energy `energy` makes the least error.
+
+        Of the ends alone beyond them.
+        """
+        corners = self.corners(weight)
+        spent = self.means(weight)[0][corners]
+        return self._mixed(corners, np.interp(energy, spent, np.arange(len(corners))))
+
+    def _mixed(self, corners: np.ndarray, place: float) -> np.ndarray:
+        """Shares [L] at a place between two corners, 1.5 in the middle of the second and third."""
         before = min(int(place), len(corners) - 1)
         after = min(before + 1, len(corners) - 1)
         shares = np.zeros(self.energy.shape[1])

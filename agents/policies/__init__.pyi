@@ -7,8 +7,7 @@ from .fixed import (
 )
 from .learned import (
     NetworkPolicy as NetworkPolicy,
-    Provenance as Provenance,
-    first_line as first_line,
+    Scheduler as Scheduler,
     load_policy as load_policy,
 )
 from .looking import (
@@ -21,12 +20,14 @@ from .practice import (
     FAMILIES_OF_PRACTICE as FAMILIES_OF_PRACTICE,
     PolicyFamily as PolicyFamily,
 )
+from .recurrent import RecurrentPolicy as RecurrentPolicy
 from .rules import (
     SNR_FEATURE as SNR_FEATURE,
     SnrThresholdPolicy as SnrThresholdPolicy,
     SnrTwoThresholdPolicy as SnrTwoThresholdPolicy,
     rule_in_words as rule_in_words,
 )
+from .scheduler_files import Provenance as Provenance, first_line as first_line
 from .score_networks import (
     linear_layers as linear_layers,
     mean_network as mean_network,

@@ -7,13 +7,15 @@ around it. The functions here take it out, so that using it needs torch alone.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final, Literal, cast
 
+import numpy as np
 import torch
 from torch import nn
 
+from agents.policies.policy import Observation
 from unwrap.signal import Shots
 
 if TYPE_CHECKING:
@@ -92,9 +94,14 @@ def mean_quantile_network(network: Any) -> nn.Sequential:
     actions of the first quantile, then those of the second and so on.
     """
     _require_plain(network.features_extractor)
-    modules = list(_copy_of(*network.quantile_net))
+    return mean_of_quantiles(network.quantile_net, network.n_quantiles)
+
+
+def mean_of_quantiles(network: nn.Sequential, quantiles: int) -> nn.Sequential:
+    """The same network with the mean over the quantiles in its last layer; see there."""
+    modules = list(_copy_of(*network))
     last = cast(nn.Linear, modules[-1])
-    shape = network.n_quantiles, -1
+    shape = quantiles, -1
     # In float64, rounded once.
     weight = last.weight.double().reshape(*shape, last.in_features).mean(dim=0)
     mean = _linear(weight, last.bias.double().reshape(shape).mean(dim=0))
@@ -211,14 +218,32 @@ def _linear(weight: torch.Tensor, bias: torch.Tensor) -> nn.Linear:
     return layer
 
 
-def require_widths(network: nn.Sequential, feature_names: Sequence[str]) -> None:
-    """Raise ValueError unless `network` maps these features to a score per action."""
+def require_widths(network: nn.Sequential, features: int) -> None:
+    """Raise ValueError unless `network` maps that many features to a score per action."""
     layers = widths_of(network)
-    if layers[0] != len(feature_names) or layers[-1] != len(Shots):
+    if layers[0] != features or layers[-1] != len(Shots):
         raise ValueError(
             f"network maps {layers[0]} features to {layers[-1]} scores; "
-            f"expected {len(feature_names)} features and {len(Shots)} scores"
+            f"expected {features} features and {len(Shots)} scores"
         )
+
+
+def features_of(observation: Observation, feature_names: Sequence[str]) -> torch.Tensor:
+    """The features of an observation as a network reads them, float32 [..., D].
+
+    Raises
+    ------
+    ValueError
+        It has another number of features.
+    """
+    told = observation["state"] if isinstance(observation, Mapping) else observation
+    features = torch.as_tensor(np.asarray(told, dtype=np.float32))
+    if features.shape[-1:] != (len(feature_names),):
+        raise ValueError(
+            f"observation has shape {tuple(features.shape)}; expected {len(feature_names)} "
+            f"features: {', '.join(feature_names)}"
+        )
+    return features
 
 
 def _copy_of(*modules: nn.Module) -> nn.Sequential:

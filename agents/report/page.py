@@ -20,6 +20,7 @@ from agents.report.answer import (
     percent,
     verdict,
 )
+from agents.report.budget_words import budget_rows
 from agents.report.results import (
     FRAMES,
     RESULTS,
@@ -79,6 +80,7 @@ def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip | 
         answer=results["answer"],
         families_measured=_families(results),
         knob=_knob(results),
+        budget=budget_rows(results),
         rows=_rows(results),
         cards=_cards(results),
         panels=[{"key": key, "title": panel.title, **panel.scale} for key, panel in panels.items()],

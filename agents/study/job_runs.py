@@ -24,7 +24,7 @@ from agents.evaluation import (
     table_fronts,
     tune_families,
 )
-from agents.policies import NetworkPolicy, RandomPolicy, load_policy
+from agents.policies import RandomPolicy, Scheduler, load_policy
 from agents.study.job_results import JobResult, stands, write_result
 from agents.study.jobs import REFERENCES, Job
 from agents.training import train_scheduler
@@ -122,7 +122,7 @@ def front_of_job(job: Job, stem: Path) -> PlayedFront:
     return _played(config, lambda price: tuned[price].policy, prices)
 
 
-def _front_of_scheduler(config: DemoConfig, scheduler: NetworkPolicy, price: float) -> PlayedFront:
+def _front_of_scheduler(config: DemoConfig, scheduler: Scheduler, price: float) -> PlayedFront:
     check_study(config, scheduler)
     # Also where the preset's price is not among those of its training: it is what the reward asks.
     own = tuple(sorted({*prices_of(scheduler, config.study.prices), price}))
@@ -138,7 +138,7 @@ def _played(config: DemoConfig, at_price: Any, prices: Sequence[float]) -> Playe
         envs,
         drive_seeds(study, study.drives),
         prices,
-        names=lambda policy: "scheduler" if isinstance(policy, NetworkPolicy) else str(policy),
+        names=lambda policy: "scheduler" if isinstance(policy, Scheduler) else str(policy),
     )
 
 

@@ -15,14 +15,14 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
 from agents.config import AgentConfig
-from agents.policies import NetworkPolicy, Provenance, first_line
+from agents.policies import Provenance, Scheduler, first_line
 from shotenv.config import EnvConfig
 from unwrap.support import write_bytes
 
 # One file, replaced whole: network, optimiser and progress of the same round, or none of them.
 CHECKPOINT: Final = "checkpoint.safetensors"
 SCHEMA: Final = "2"
-Validate = Callable[[NetworkPolicy], float]
+Validate = Callable[[Scheduler], float]
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class TrainingState:
     best_return: float = -math.inf
     best_round: int = -1
 
-    def judged(self, policy: NetworkPolicy, validate: Validate, out: Path) -> TrainingState:
+    def judged(self, policy: Scheduler, validate: Validate, out: Path) -> TrainingState:
         """This state with the return of `policy`, which is kept in `out` where it is the best."""
         found = validate(policy)
         state = replace(self, last_return=found)

@@ -1,9 +1,9 @@
-"""PPO training of a scheduler: interruptible, resumable, without pickle.
+"""PPO training of a scheduler, or RecurrentPPO: interruptible, resumable, without pickle.
 
 Training runs in rounds of whole drives. A round starts every environment on one of the training
 drives, chosen with a random state that derives from the run's seed and the round's number alone;
 so what a round does is a function of the network, the optimiser and that number, and a resumed
-run equals an uninterrupted one.
+run equals an uninterrupted one. What an LSTM remembers is of a drive, and begins with it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from stable_baselines3.common.utils import set_random_seed
 from tqdm import tqdm
 
 from agents.config import AgentConfig
-from agents.policies import NetworkPolicy
+from agents.policies import NetworkPolicy, RecurrentPolicy, Scheduler, load_policy
 from agents.training.checkpoint import (
     Checkpoint,
     TrainingState,
@@ -31,6 +31,7 @@ from agents.training.checkpoint import (
     provenance_of,
     training_drives,
 )
+from agents.training.contrib import contrib_learner
 from agents.training.sb3_vector import Sb3VecEnv
 from agents.training.scalars import Scalars
 from shotenv.config import EnvConfig
@@ -38,7 +39,7 @@ from unwrap.support import progress
 
 
 class PpoTrainer:
-    """One PPO run in the folder `out`.
+    """One run of PPO, or of RecurrentPPO, in the folder `out`.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ class PpoTrainer:
     frames_per_drive : int
         Length of an episode; a round lasts at least that long.
     config : AgentConfig
-        Hyper-parameters.
+        Hyper-parameters; its `algorithm` is "ppo" or "recurrent_ppo".
     validate : callable
         Mean return of a policy on validation drives; the best round's policy is kept.
     out : Path
@@ -84,8 +85,14 @@ class PpoTrainer:
         self._round_steps = updates * ppo.rollout_steps * ppo.num_envs
         self._rounds = math.ceil(ppo.total_steps / self._round_steps)
         self._learning_rate = ppo.learning_rate
-        self._ppo = PPO(
-            "MlpPolicy",
+        form: dict[str, Any] = {"net_arch": list(config.hidden)}
+        self._recurrent = config.algorithm == "recurrent_ppo"
+        algorithm: Any = PPO
+        if self._recurrent:
+            algorithm = contrib_learner("RecurrentPPO", config.algorithm)
+            form["lstm_hidden_size"] = config.recurrent.units
+        self._ppo = algorithm(
+            "MlpLstmPolicy" if self._recurrent else "MlpPolicy",
             envs,
             # stable-baselines3 would let it fall within each `learn`, thus within each round.
             learning_rate=lambda remaining: self._learning_rate,
@@ -95,7 +102,7 @@ class PpoTrainer:
             gamma=ppo.gamma,
             gae_lambda=ppo.gae_lambda,
             ent_coef=ppo.entropy_coefficient,
-            policy_kwargs={"net_arch": list(config.hidden)},
+            policy_kwargs=form,
             seed=config.seed,
             device="cpu",  # two small layers: copying to a GPU would take longer
         )
@@ -104,11 +111,13 @@ class PpoTrainer:
         self._scalars = Scalars(out if config.tensorboard else None)
 
     @property
-    def policy(self) -> NetworkPolicy:
+    def policy(self) -> Scheduler:
         """The actor as it is now."""
+        if self._recurrent:
+            return RecurrentPolicy.from_recurrent_ppo(self._ppo.policy, self._provenance)
         return NetworkPolicy.from_ppo(self._ppo.policy, self._provenance)
 
-    def run(self) -> NetworkPolicy:
+    def run(self) -> Scheduler:
         """Train to the end, from the checkpoint where there is one; returns the best policy.
 
         Raises
@@ -141,8 +150,8 @@ class PpoTrainer:
                     1.0 - 0.9 * state.rounds / self._rounds
                 )
                 # `learn` counts its steps from 0, and therefore resets the environments first:
-                # network and optimiser are all that it keeps from the round before. The drives
-                # that `seed_all` chose begin there.
+                # network and optimiser are all that it keeps from the round before, for memories
+                # begin anew with the drives. Those that `seed_all` chose begin there.
                 self._ppo.learn(self._round_steps, callback=_Ticks(bar))
                 state = state.judged(self.policy, self._validate, self._out)
                 state = replace(state, rounds=state.rounds + 1)
@@ -152,7 +161,7 @@ class PpoTrainer:
                 )
                 self._save(state)
         # From disk: the best round's policy, which need not be the last one's.
-        return NetworkPolicy.load(self._out)
+        return load_policy(self._out)
 
     def _save(self, state: TrainingState) -> None:
         self._checkpoint.save(_tensors(self._ppo), state)
@@ -170,7 +179,7 @@ class _Ticks(BaseCallback):
         return True
 
 
-def _tensors(ppo: PPO) -> dict[str, torch.Tensor]:
+def _tensors(ppo: Any) -> dict[str, torch.Tensor]:
     """Network and optimiser as named tensors: a file of them needs no unpickling to be read."""
     network = {f"network.{name}": value for name, value in ppo.policy.state_dict().items()}
     adam = {
@@ -182,7 +191,7 @@ def _tensors(ppo: PPO) -> dict[str, torch.Tensor]:
     return {name: value.detach().clone().contiguous() for name, value in (network | adam).items()}
 
 
-def _restore(ppo: PPO, tensors: dict[str, torch.Tensor]) -> None:
+def _restore(ppo: Any, tensors: dict[str, torch.Tensor]) -> None:
     """Inverse of `_tensors`."""
     network: dict[str, torch.Tensor] = {}
     slots: dict[int, dict[str, Any]] = {}

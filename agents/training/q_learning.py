@@ -18,28 +18,11 @@ from tqdm import tqdm
 from agents.config import AgentConfig
 from agents.policies import NetworkPolicy
 from agents.training.checkpoint import TrainingState, Validate, provenance_of
+from agents.training.contrib import contrib_learner
 from agents.training.sb3_vector import Sb3VecEnv
 from agents.training.scalars import Scalars
 from shotenv.config import EnvConfig
 from unwrap.support import progress
-
-
-def quantile_learner() -> Any:
-    """`QRDQN` of sb3-contrib.
-
-    Raises
-    ------
-    ImportError
-        It is not installed.
-    """
-    try:
-        from sb3_contrib import QRDQN
-    except ImportError:
-        raise ImportError(
-            "agent.algorithm qrdqn needs sb3-contrib, which is not installed: "
-            "pip install sb3-contrib"
-        ) from None
-    return QRDQN
 
 
 class QLearner:
@@ -76,7 +59,7 @@ class QLearner:
         form: dict[str, Any] = {"net_arch": list(config.hidden)}
         if self._quantiles:
             form["n_quantiles"] = learner.quantiles
-        algorithm: Any = quantile_learner() if self._quantiles else DQN
+        algorithm: Any = contrib_learner("QRDQN", "qrdqn") if self._quantiles else DQN
         self.model = algorithm(
             "MlpPolicy",
             envs,

@@ -10,7 +10,7 @@ import numpy as np
 
 from agents.config import DemoConfig
 from agents.evaluation import FIXED_POLICIES, drive_seeds, make_envs
-from agents.policies import NetworkPolicy
+from agents.policies import Scheduler
 from agents.training.branching import Branches
 from agents.training.checkpoint import Validate, training_drives
 from agents.training.ppo import PpoTrainer
@@ -30,7 +30,7 @@ VALIDATION_PRICES: Final = 4
 """Prices of power at which validation drives are played (assumed)."""
 
 
-def train_scheduler(config: DemoConfig, out: Path) -> NetworkPolicy:
+def train_scheduler(config: DemoConfig, out: Path) -> Scheduler:
     """Train on training drives, where the learner can from its checkpoint in `out`.
 
     The policy with the best return on validation drives, over all prices, is kept;
@@ -52,7 +52,7 @@ def train_scheduler(config: DemoConfig, out: Path) -> NetworkPolicy:
     judging = branches_of(env, "validation", seeds[:count])
     prices = validation_prices(env.reward.power)
 
-    def validate(policy: NetworkPolicy) -> float:
+    def validate(policy: Scheduler) -> float:
         return judging.mean_return(policy, prices)
 
     policy = _trained(env, config, judging, validate, out)
@@ -63,21 +63,21 @@ def train_scheduler(config: DemoConfig, out: Path) -> NetworkPolicy:
 
 def _trained(
     env: EnvConfig, config: DemoConfig, judging: Branches, validate: Validate, out: Path
-) -> NetworkPolicy:
+) -> Scheduler:
     """The policy that the learner of the configuration keeps."""
     agent = config.agent
     if agent.algorithm == "regression":
         seeds = training_drives(agent.seed, agent.regression.drives).tolist()
         training = branches_of(env, "train", seeds)
         return RegressionTrainer(training, judging, agent, validate, out).run()
-    if agent.algorithm == "ppo":
+    if agent.algorithm in ("ppo", "recurrent_ppo"):
         return ppo_trainer(env, config, validate, out).run()
     envs = Sb3VecEnv(make_envs(env, "train", agent.dqn.num_envs, "SameStep"))
     return QLearner(envs, FEATURE_NAMES, agent, validate, out, env).run()
 
 
 def rescore(
-    policy: NetworkPolicy,
+    policy: Scheduler,
     judging: Branches,
     others: Branches,
     prices: Sequence[float],
@@ -97,7 +97,7 @@ def rescore(
     )
 
 
-def gain_over_fixed(policy: NetworkPolicy, drives: Branches, prices: Sequence[float]) -> float:
+def gain_over_fixed(policy: Scheduler, drives: Branches, prices: Sequence[float]) -> float:
     """Mean return beyond that of the best fixed choice at each of the `prices`."""
     fixed = [
         max(drives.mean_return(one, [price]) for one in FIXED_POLICIES.values()) for price in prices

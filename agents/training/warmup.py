@@ -45,10 +45,13 @@ class KnownFrames:
     observations : float32 [N, D]
     cost : float32 [N, A]
         Weighted reward terms of each action with a working laser.
+    per_drive : int
+        Frames that follow each other; then another drive begins.
     """
 
     observations: Tensor
     cost: Tensor
+    per_drive: int = 1
 
     @property
     def advantage(self) -> Tensor:
@@ -81,6 +84,7 @@ def known_frames(
     return KnownFrames(
         torch.from_numpy(observations.reshape(-1, observations.shape[-1])),
         torch.from_numpy(np.tile(cost, (ROLLOUTS, 1, 1)).reshape(-1, cost.shape[-1])).float(),
+        per_drive=cost.shape[1],
     )
 
 
@@ -104,23 +108,39 @@ class _Recorded(Policy):
 def warm_start(network: ActorCriticPolicy, known: KnownFrames, *, seed: int) -> None:
     """Train the actor of `network` to make the expected cost of the known frames small.
 
-    The result depends on the arguments alone; the critic stays as it is.
+    The result depends on the arguments alone; the critic stays as it is. A memory is shown whole
+    drives, frame after frame.
     """
     generator = torch.Generator().manual_seed(seed)
     optimizer = torch.optim.AdamW(network.parameters(), RATE, weight_decay=WEIGHT_DECAY)
-    advantage, count = known.advantage, len(known.cost)
-    batches = -(-count // BATCH)
+    length = known.per_drive if hasattr(network, "lstm_actor") else 1
+    observations, advantage = (
+        each.unflatten(0, (-1, length)) for each in (known.observations, known.advantage)
+    )
+    count, batch = len(advantage), max(BATCH // length, 1)
+    batches = -(-count // batch)
     # The rate falls along a cosine to 0 over all steps.
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, PASSES * batches)
     network.set_training_mode(True)
     # No loss touches the critic: its gradients stay None, and AdamW leaves such parameters alone.
     for _ in range(PASSES):
-        for rows in torch.randperm(count, generator=generator).split(BATCH):
-            actor: Any = network.get_distribution(known.observations[rows]).distribution
-            expected = (actor.probs * advantage[rows]).sum(dim=1)
+        for rows in torch.randperm(count, generator=generator).split(batch):
+            actor = _actor(network, observations[rows])
+            expected = (actor.probs * advantage[rows].flatten(0, 1)).sum(dim=1)
             loss = (expected - ENTROPY * actor.entropy()).mean()
             optimizer.zero_grad()
             loss.backward()
             optimizer.step()
             schedule.step()
     network.set_training_mode(False)
+
+
+def _actor(network: Any, observations: Tensor) -> Any:
+    """Distributions over the actions of drives [N, T, D], frame after frame, N * T of them."""
+    frames = observations.flatten(0, 1)
+    if not hasattr(network, "lstm_actor"):
+        return network.get_distribution(frames).distribution
+    # Nothing is remembered before the first frame, and no drive begins after it.
+    state = torch.zeros(1, len(observations), network.lstm_actor.hidden_size)
+    found, _ = network.get_distribution(frames, (state, state), torch.zeros(len(frames)))
+    return found.distribution

@@ -100,6 +100,9 @@ def test_an_interrupted_training_of_the_command_line_goes_on(capsys, monkeypatch
 
 
 SHORT = {
+    "recurrent_ppo": "--agent.ppo.total_steps 64 --agent.ppo.num_envs 2"
+    " --agent.ppo.rollout_steps 16 --agent.ppo.batch_size 16 --agent.ppo.drives 2"
+    " --agent.recurrent.units 4",
     "dqn": "--agent.dqn.total_steps 64 --agent.dqn.num_envs 2 --agent.dqn.learning_starts 16",
     "qrdqn": "--agent.dqn.total_steps 64 --agent.dqn.num_envs 2 --agent.dqn.learning_starts 16",
     "regression": "--agent.regression.rounds 1 --agent.regression.drives 2"

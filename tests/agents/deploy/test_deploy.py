@@ -27,6 +27,7 @@ from agents.deploy.onnx_policy import check_onnx, onnx_policy
 from agents.evaluation.play import make_envs
 from agents.policies.fixed import CyclePolicy, FixedPolicy, RandomPolicy
 from agents.policies.learned import NetworkPolicy, Provenance
+from agents.policies.recurrent import RecurrentPolicy
 from agents.policies.score_networks import mean_network, score_network
 from shotenv.config.keywords import env_config
 from shotenv.decision.features import FEATURE_NAMES
@@ -227,3 +228,12 @@ def test_the_command_line(tmp_path, capsys):
     ):
         status, _, err = run(*words)
         assert status == code and names in err
+
+
+def test_a_scheduler_with_a_memory_is_refused(tmp_path, capsys):
+    told = Provenance(algorithm="recurrent_ppo", feature_names=("power",))
+    network = RecurrentPolicy(torch.nn.LSTM(1, 4), score_network((4, 3), "tanh"), told)
+    network.save(tmp_path / "agent")
+    assert main(["export", str(tmp_path / "agent"), "--out", str(tmp_path / "out")]) == 1
+    assert "RecurrentPolicy, which remembers what is in no observation" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

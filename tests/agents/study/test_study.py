@@ -155,6 +155,19 @@ def test_jobs_run_in_processes_and_a_failure_keeps_the_others(files):
     assert read_result(out / random.name).fronts["front"].prices == (0.02, 0.09, 0.1)
 
 
+def test_a_learner_with_a_memory_is_a_job_like_the_others(files):
+    ppo = {"total_steps": 32, "num_envs": 2, "rollout_steps": 8, "batch_size": 8, "drives": 2}
+    agent = {"algorithm": "recurrent_ppo", "hidden": [4], "recurrent": {"units": 4}, "ppo": ppo}
+    (files / "memory.yaml").write_text(yaml.safe_dump(agent))
+    plan = plan_of(files, policies=[str(files / "memory.yaml")], ablations={}, seeds=[0])
+    _, job = jobs_of(plan)
+    run_here([job], files / "out")
+    front = read_result(files / "out" / job.name).fronts["front"]
+    assert front.prices == (0.02, 0.09, 0.1) and set(front.policies) == {"scheduler"}
+    saved = plan_of(files, policies=[str(files / "out" / job.name)], ablations={}, seeds=[0])
+    assert [job.kind for job in jobs_of(saved)] == ["references", "saved"]
+
+
 def test_ctrl_c_says_what_is_kept(files, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
