@@ -1,4 +1,4 @@
-"""What the jobs of a study played, as a table for each preset."""
+"""What the jobs of a study played, as a table for each preset and each place of a transfer."""
 
 from __future__ import annotations
 
@@ -38,23 +38,24 @@ def make_leaderboard(plan: StudyPlan, jobs: Sequence[Job], folder: Path) -> dict
     Raises
     ------
     ValueError
-        A result is missing, damaged, or of other clips than the rest of its preset.
+        A result is missing, damaged, or of other clips than the rest of its table.
     """
-    presets = list(dict.fromkeys(job.preset for job in jobs))
     tables, seconds = {}, 0.0
-    for preset in presets:
-        tables[preset], took = _table([job for job in jobs if job.preset == preset], folder)
+    for name in dict.fromkeys(job.table for job in jobs):
+        tables[name], took = _table([job for job in jobs if job.table == name], folder)
         seconds += took
+    elsewhere = plan.transfer.tables if plan.transfer else {}
     return {
         "plan": plan.model_dump(mode="json"),
         "seconds": seconds,
         "versions": {name: version(name) for name in PACKAGES},
-        "presets": tables,
+        "presets": {name: table for name, table in tables.items() if name not in elsewhere},
+        "transfer": {name: tables[name] for name in elsewhere},
     }
 
 
 def _table(jobs: Sequence[Job], folder: Path) -> tuple[dict[str, Any], float]:
-    """One preset's rows, and the seconds that its jobs took."""
+    """One table's rows, and the seconds that its jobs took."""
     results = {job.name: read_result(folder / job.name) for job in jobs}
     config, measured_by = next(
         (job.config, results[job.name]) for job in jobs if job.kind == REFERENCES
@@ -86,7 +87,7 @@ def _table(jobs: Sequence[Job], folder: Path) -> tuple[dict[str, Any], float]:
 
     resamples = Resamples.draw(len(frames), config.study)
     point, drawn = measured(np.ones(len(frames))), []
-    with progress(len(resamples.clips), f"resamples of {jobs[0].preset}", "draw") as bar:
+    with progress(len(resamples.clips), f"resamples of {jobs[0].table}", "draw") as bar:
         for weight in resamples.clips:
             drawn.append(measured(weight))
             bar.update(1)
@@ -104,6 +105,7 @@ def _table(jobs: Sequence[Job], folder: Path) -> tuple[dict[str, Any], float]:
         "bank": bank_of(config.env),
         "env": config.env.model_dump(mode="json"),
         "price": price,
+        "split": config.study.split,
         "clips": len(frames),
         "drives": config.study.drives,
         "best": best,
