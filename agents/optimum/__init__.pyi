@@ -13,4 +13,10 @@ from .fronts import (
     front_of as front_of,
 )
 from .outcome_table import DriveTable as DriveTable, PlayedTable as PlayedTable, play as play
-from .tabulation import Possible as Possible, drive_of as drive_of, tabulate as tabulate
+from .tabulation import (
+    Possible as Possible,
+    clips_of as clips_of,
+    drive_of as drive_of,
+    frames_of as frames_of,
+    tabulate as tabulate,
+)

@@ -242,6 +242,11 @@ def test_a_study_is_played_kept_and_measured(files, monkeypatch):
     )
     fast = table["rows"]["fast"]["return"]
     assert fast["low"] <= fast["iqm"] <= fast["high"] and len(fast["seeds"]) == 2
+    assert table["kinds"]["fixed"] == "rule" and set(table["differences"]) | {table["best"]} == set(
+        table["rows"]
+    )
+    families = table["groups"]["family"]
+    assert sum(group["clips"] for group in families.values()) == table["clips"]
     # The return at the price of the preset is that of the point that was played at it.
     rows = table["fronts"]["fast"]
     assert fast["seeds"] == pytest.approx(
