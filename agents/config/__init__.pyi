@@ -7,4 +7,9 @@ from .agent import (
 )
 from .demo import DemoConfig as DemoConfig
 from .study_config import StudyConfig as StudyConfig
-from .study_plan import AblationConfig as AblationConfig, StudyPlan as StudyPlan
+from .study_plan import (
+    AblationConfig as AblationConfig,
+    StudyPlan as StudyPlan,
+    TransferConfig as TransferConfig,
+    TransferTable as TransferTable,
+)

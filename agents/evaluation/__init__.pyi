@@ -4,7 +4,7 @@ from .episodes import (
     require_minari as require_minari,
     write_dataset as write_dataset,
 )
-from .front_measures import measures_of as measures_of, references as references
+from .front_measures import main_measures as main_measures, references as references
 from .headroom import check_solvable as check_solvable, measure_problem as measure_problem
 from .match import Match as Match, Tally as Tally
 from .play import (

@@ -16,6 +16,7 @@ import numpy as np
 from agents.config import StudyConfig
 from agents.evaluation.price_sweep import PlayedFront
 from agents.evaluation.statistics import resampled_each
+from agents.optimum import Front
 from unwrap.signal import Shots
 
 BLIND: Final = "blind"
@@ -102,15 +103,27 @@ def measures_of(
             found[f"life_factor_{at}"] = against.always_eight_life_h / (shares @ life_h)
             found[f"cooler_k_{at}"] = against.always_eight_k - shares @ temperature_k
         found[f"energy_{at}"] = front.energy_at(allowed * against.cool_eight_m, weight)
-    at_half_m = float(front.error_at(HALF, weight))
-    found["error_at_half_energy"] = at_half_m
-    found["below_blind_at_half_energy"] = 1.0 - at_half_m / against.blind_at_half_m
-    if not np.isnan(against.optimum_m).any():
-        found["gap_closed"] = gap_closed(
-            front.error_at(COMPARED, weight), against.blind_m, against.optimum_m
-        )
+    found |= main_measures(front, against, weight)
+    found["below_blind_at_half_energy"] = (
+        1.0 - found["error_at_half_energy"] / against.blind_at_half_m
+    )
     found["hypervolume"] = one.front.hypervolume(against.always_two_m, weight)
     return {name: float(value) for name, value in found.items()}
+
+
+def main_measures(mixed: Front, against: References, weight: np.ndarray) -> Measures:
+    """Energy at equal error, error at half the energy, and the gap that is closed.
+
+    Of a front that was mixed with blind choices; without an optimum there is no gap.
+    """
+    at_half_m, *compared_m = mixed.error_at(np.concatenate(([HALF], COMPARED)), weight)
+    found = {
+        "energy_at_equal_error": mixed.energy_at(against.cool_eight_m, weight),
+        "error_at_half_energy": float(at_half_m),
+    }
+    if not np.isnan(against.optimum_m).any():
+        found["gap_closed"] = gap_closed(np.array(compared_m), against.blind_m, against.optimum_m)
+    return found
 
 
 def gap_closed(own_m: np.ndarray, blind_m: np.ndarray, optimum_m: np.ndarray) -> float:

@@ -73,6 +73,18 @@ class PlayedFront:
             for i, (price, policy) in enumerate(zip(self.prices, self.policies, strict=True))
         ]
 
+    def of_clips(self, chosen: np.ndarray) -> PlayedFront:
+        """The same of those clips alone that are `chosen`, bool [C]."""
+        own = self.front
+        return PlayedFront(
+            Front(own.energy[chosen], own.depth_mae_m[chosen], own.frames[chosen]),
+            self.prices,
+            self.policies,
+            self.returns[chosen],
+            self.life_used_h[chosen],
+            self.temperature_k[chosen],
+        )
+
     def beside(self, other: PlayedFront) -> PlayedFront:
         """This front's points, then those of another on the same drives."""
         own, its = self.front, other.front

@@ -19,7 +19,13 @@ from .fronts import (
     front_of as front_of,
 )
 from .outcome_table import DriveTable as DriveTable, PlayedTable as PlayedTable, play as play
-from .tabulation import Possible as Possible, drive_of as drive_of, tabulate as tabulate
+from .tabulation import (
+    Possible as Possible,
+    clips_of as clips_of,
+    drive_of as drive_of,
+    frames_of as frames_of,
+    tabulate as tabulate,
+)
 from .temporal_error import (
     STILL_M as STILL_M,
     tabulate_temporal_errors as tabulate_temporal_errors,

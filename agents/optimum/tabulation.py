@@ -105,9 +105,7 @@ class Possible:
 
     def clips(self) -> np.ndarray:
         """Number of the bank's clip that each frame is of, int64 [N, T]."""
-        frames = torch.cat([drive.frames[:, :-1] for drive in self.drives]).numpy()
-        starts = np.array([clip.start for clip in self.problem.bank.clips])
-        return np.searchsorted(starts, frames, side="right") - 1
+        return clips_of(self.problem, frames_of(self.drives))
 
     def _stacked(self, of: Callable[[Outcomes], Tensor]) -> np.ndarray:
         return np.stack([of(one).numpy().astype(np.float64) for one in self.outcomes])
@@ -141,6 +139,17 @@ def drive_of(problem: Problem, seed: int) -> Drive:
         bank.width,
         network=problem.network_work,
     )
+
+
+def frames_of(drives: Sequence[Drive]) -> np.ndarray:
+    """Bank frames that drives, batches of one, play, int64 [N, T]."""
+    return torch.cat([drive.frames[:, :-1] for drive in drives]).numpy()
+
+
+def clips_of(problem: Problem, frames: np.ndarray) -> np.ndarray:
+    """Number of the bank's clip that each of its `frames` [...] is of."""
+    starts = np.array([clip.start for clip in problem.bank.clips])
+    return np.searchsorted(starts, frames, side="right") - 1
 
 
 def energy_surplus(temperature_k: np.ndarray, laser: LaserConfig) -> np.ndarray:

@@ -45,11 +45,13 @@ def run_jobs(jobs: Sequence[Job], folder: Path, *, workers: int) -> None:
         Ctrl-C; what was finished is kept, and the message says how much.
     """
     # Renders and predicts, too, what several processes would else do at the same time.
-    banks = {job.preset: bank_of(job.config.env) for job in jobs}
+    banks = banks_of(jobs)
     left = [
-        (job, told)
-        for job in jobs
-        if not stands(folder / job.name, told := job.depends_on(banks[job.preset]))
+        (job, told) for job in jobs if not stands(folder / job.name, told := job.depends_on(banks))
+    ]
+    # What is played elsewhere comes after all that trains.
+    waves = [
+        [one for one in left if (one[0].source is not None) is later] for later in (False, True)
     ]
     failed: list[str] = []
     done = len(jobs) - len(left)
@@ -61,11 +63,12 @@ def run_jobs(jobs: Sequence[Job], folder: Path, *, workers: int) -> None:
         ) as pool,
     ):
         try:
-            waiting = {pool.submit(run_job, job, folder, told): job for job, told in left}
-            for future in as_completed(waiting):
-                if (error := future.exception()) is not None:
-                    failed.append(f"{waiting[future].name}: {error or type(error).__name__}")
-                bar.update(1)
+            for wave in waves:
+                waiting = {pool.submit(run_job, job, folder, told): job for job, told in wave}
+                for future in as_completed(waiting):
+                    if (error := future.exception()) is not None:
+                        failed.append(f"{waiting[future].name}: {error or type(error).__name__}")
+                    bar.update(1)
         except KeyboardInterrupt:
             for process in multiprocessing.active_children():
                 process.terminate()
@@ -78,6 +81,13 @@ def run_jobs(jobs: Sequence[Job], folder: Path, *, workers: int) -> None:
         raise ValueError(
             f"{len(failed)} of {len(jobs)} jobs failed, the others are kept: {'; '.join(failed)}"
         )
+
+
+def banks_of(jobs: Sequence[Job]) -> dict[str, str]:
+    """Fingerprint of the bank of each table, and of those of the jobs' sources."""
+    both = (one for job in jobs for one in (job, job.source) if one is not None)
+    tables = {job.table: job.config.env for job in both}
+    return {table: bank_of(env) for table, env in tables.items()}
 
 
 def bank_of(config: EnvConfig) -> str:
@@ -102,24 +112,44 @@ def run_job(job: Job, folder: Path, depends_on: dict[str, Any]) -> None:
             optimum, arrays["cool_eight_m"] = table_fronts(problem, study)
             fronts |= {"optimum": optimum} if optimum else {}
         else:
-            fronts = {"front": front_of_job(job, stem)}
+            fronts = {"front": front_of_job(job, folder, depends_on)}
     write_result(stem, JobResult(fronts, time.process_time() - began, arrays), depends_on)
 
 
-def front_of_job(job: Job, stem: Path) -> PlayedFront:
-    """Train or tune, and play at every price of the study and at that of the preset."""
+def front_of_job(job: Job, folder: Path, depends_on: dict[str, Any]) -> PlayedFront:
+    """Train or tune, unless another job does, and play at every price of the study and at that of
+    the preset."""
     config, price = job.config, price_of(job.config.env)
     prices = tuple(sorted({*config.study.prices, price}))
     if job.kind in ("learned", "saved"):
-        # Training resumes in this folder where it was interrupted.
-        scheduler = load_policy(job.folder) if job.folder else train_scheduler(config, stem)
-        return _front_of_scheduler(config, scheduler, price)
+        return _front_of_scheduler(config, _scheduler(job, folder, depends_on), price)
     if job.kind == "random":
         policy = RandomPolicy(job.seed)
         return _played(config, lambda price: policy, prices)
-    study = config.study.model_copy(update={"families": (job.policy,)})
-    (tuned,) = tune_families(config.model_copy(update={"study": study})).values()
+    # Cheap enough to be done again for each place: the same drives give the same rule.
+    tuning = job.source.config if job.source else config
+    study = tuning.study.model_copy(update={"families": (job.policy,), "prices": prices})
+    (tuned,) = tune_families(tuning.model_copy(update={"study": study})).values()
     return _played(config, lambda price: tuned[price].policy, prices)
+
+
+def _scheduler(job: Job, folder: Path, depends_on: dict[str, Any]) -> Scheduler:
+    """The scheduler that a job plays: a saved one, that of its source, or its own.
+
+    Raises
+    ------
+    ValueError
+        The source has no result.
+    """
+    if job.folder is not None:
+        return load_policy(job.folder)
+    if job.source is None:
+        # Training resumes in this folder where it was interrupted.
+        return train_scheduler(job.config, folder / job.name)
+    # A training that was cut off has left a scheduler, too, but no result.
+    if not stands(folder / job.source.name, depends_on["source"]):
+        raise ValueError(f"{job.source.name}, which trains its scheduler, has no result")
+    return load_policy(folder / job.source.name)
 
 
 def _front_of_scheduler(config: DemoConfig, scheduler: Scheduler, price: float) -> PlayedFront:

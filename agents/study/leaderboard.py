@@ -1,35 +1,26 @@
-"""What the jobs of a study played, as a table for each preset."""
+"""What the jobs of a study played, as a table for each preset and each place of a transfer."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from agents.config import StudyPlan
-from agents.evaluation import (
-    PACKAGES,
-    Interval,
-    PlayedFront,
-    measures_of,
-    price_of,
-    references,
-)
+from agents.config import DemoConfig, StudyPlan
+from agents.evaluation import PACKAGES, PlayedFront, price_of
+from agents.study.clip_groups import clip_groups
 from agents.study.job_results import read_result
 from agents.study.job_runs import bank_of
 from agents.study.jobs import REFERENCES, Job
 from agents.study.seed_statistics import Resamples
-from unwrap.support import progress
+from agents.study.table_fronts import TableFronts, leaves_out
 
-MEASURES: Final[tuple[str, ...]] = ("gap_closed", "error_at_half_energy", "energy_at_equal_error")
-"""See `agents.evaluation.compare_fronts`. There is no gap without an optimum."""
-RETURN: Final = "return"
-"""Of a drive at the preset's price of power."""
-ROUNDING: Final = 1e-9
 RANKED_BY: Final = "error_at_half_energy"
+GROUP_DRAWS: Final = 250
+"""Resamples of a group of clips at most (assumed): there are eight groups in a table."""
 
 
 def make_leaderboard(plan: StudyPlan, jobs: Sequence[Job], folder: Path) -> dict[str, Any]:
@@ -38,120 +29,87 @@ def make_leaderboard(plan: StudyPlan, jobs: Sequence[Job], folder: Path) -> dict
     Raises
     ------
     ValueError
-        A result is missing, damaged, or of other clips than the rest of its preset.
+        A result is missing, damaged, or of other clips than the rest of its table.
     """
-    presets = list(dict.fromkeys(job.preset for job in jobs))
     tables, seconds = {}, 0.0
-    for preset in presets:
-        tables[preset], took = _table([job for job in jobs if job.preset == preset], folder)
+    for name in dict.fromkeys(job.table for job in jobs):
+        tables[name], took = _table([job for job in jobs if job.table == name], folder)
         seconds += took
+    elsewhere = plan.transfer.tables if plan.transfer else {}
     return {
         "plan": plan.model_dump(mode="json"),
         "seconds": seconds,
         "versions": {name: version(name) for name in PACKAGES},
-        "presets": tables,
+        "presets": {name: table for name, table in tables.items() if name not in elsewhere},
+        "transfer": {name: tables[name] for name in elsewhere},
     }
 
 
 def _table(jobs: Sequence[Job], folder: Path) -> tuple[dict[str, Any], float]:
-    """One preset's rows, and the seconds that its jobs took."""
+    """One table's rows, and the seconds that its jobs took."""
     results = {job.name: read_result(folder / job.name) for job in jobs}
     config, measured_by = next(
         (job.config, results[job.name]) for job in jobs if job.kind == REFERENCES
     )
     blind, optimum = measured_by.fronts["blind"], measured_by.fronts.get("optimum")
-    cool_eight_m = measured_by.arrays["cool_eight_m"]
     rows: dict[str, list[PlayedFront]] = {}
+    kinds: dict[str, str] = {}
     for job in jobs:
         if job.kind != REFERENCES:
             rows.setdefault(job.policy, []).append(results[job.name].fronts["front"])
+            kinds[job.policy] = job.kind
             if not np.array_equal(rows[job.policy][-1].front.frames, blind.front.frames):
                 raise ValueError(f"{folder / job.name}.npz is of other clips than {REFERENCES}")
-    price, frames = price_of(config.env), blind.front.frames
-    returns = {name: np.stack([_returns(one, price) for one in row]) for name, row in rows.items()}
-
-    def measured(weight: np.ndarray) -> dict[str, dict[str, np.ndarray]]:
-        """Each measure of each row's seeds, [S], where clips count `weight` [C] times."""
-        against = references(blind, optimum, cool_eight_m, weight)
-        found: dict[str, dict[str, np.ndarray]] = {}
-        for name, row in rows.items():
-            each = [measures_of(one, blind, against, weight) for one in row]
-            found[name] = {
-                measure: np.array([one[measure] for one in each])
-                for measure in MEASURES
-                if measure in each[0]
-            }
-            found[name][RETURN] = returns[name] @ weight / (weight @ frames)
-        return found
-
-    resamples = Resamples.draw(len(frames), config.study)
-    point, drawn = measured(np.ones(len(frames))), []
-    with progress(len(resamples.clips), f"resamples of {jobs[0].preset}", "draw") as bar:
-        for weight in resamples.clips:
-            drawn.append(measured(weight))
-            bar.update(1)
-    told = {
-        name: {
-            measure: _over_seeds(
-                resamples, values, np.stack([one[name][measure] for one in drawn]), number
-            )
-            for measure, values in point[name].items()
-        }
-        for number, name in enumerate(rows)
-    }
-    best = min(told, key=lambda name: told[name][RANKED_BY]["iqm"])
+    fronts = TableFronts(
+        rows, blind, optimum, measured_by.arrays["cool_eight_m"], price_of(config.env)
+    )
+    name = jobs[0].table
+    resampled = fronts.resampled(config.study, name)
+    told = resampled.rows()
+    best = min(told, key=lambda row: told[row][RANKED_BY]["iqm"])
     table = {
         "bank": bank_of(config.env),
         "env": config.env.model_dump(mode="json"),
-        "price": price,
-        "clips": len(frames),
+        "price": fronts.price,
+        "split": config.study.split,
+        "clips": len(fronts.frames),
         "drives": config.study.drives,
+        "kinds": kinds,
         "best": best,
         "rows": told,
-        "improvement": _improvements(resamples, returns, frames),
-        "fronts": {name: [one.rows for one in row] for name, row in rows.items()}
+        "differences": resampled.differences(best),
+        "improvement": _improvements(resampled.resamples, fronts),
+        "groups": {
+            by: {group: _group(fronts, chosen, config, group) for group, chosen in groups.items()}
+            for by, groups in clip_groups(config).items()
+        },
+        "fronts": {row: [one.rows for one in of_row] for row, of_row in rows.items()}
         | {"blind": [blind.rows]}
         | ({"optimum": [optimum.rows]} if optimum else {}),
     }
     return table, sum(one.seconds for one in results.values())
 
 
-def _returns(front: PlayedFront, price: float) -> np.ndarray:
-    """Sum over the frames of each clip of the return at `price`, float64 [C]."""
-    return front.returns[:, front.prices.index(price)]
-
-
-def _over_seeds(
-    resamples: Resamples, point: np.ndarray, drawn: np.ndarray, number: int
+def _group(
+    fronts: TableFronts, chosen: np.ndarray, config: DemoConfig, name: str
 ) -> dict[str, Any]:
-    return {
-        **resamples.over_seeds(point, drawn, number).named("iqm"),
-        "mean": float(point.mean()),
-        "median": float(np.median(point)),
-        "seeds": point.tolist(),
-    }
+    """The rows, measured on a group of the clips."""
+    draws = min(config.study.bootstrap_draws, GROUP_DRAWS)
+    study = config.study.model_copy(update={"bootstrap_draws": draws})
+    rows = fronts.of_clips(chosen).resampled(study, name).rows()
+    return {"clips": int(chosen.sum()), "rows": rows}
 
 
-def _improvements(
-    resamples: Resamples, returns: Mapping[str, np.ndarray], frames: np.ndarray
-) -> dict[str, dict[str, Any]]:
+def _improvements(resamples: Resamples, fronts: TableFronts) -> dict[str, dict[str, Any]]:
     """Of each row over each other one, by the return of a clip's frames."""
-    names = list(returns)
-    found: dict[str, dict[str, Any]] = {name: {} for name in names}
-    for i, one in enumerate(names):
-        for j, other in enumerate(names):
+    returns = {name: sums[0] / fronts.frames for name, sums in fronts.at_price.items()}
+    found: dict[str, dict[str, Any]] = {name: {} for name in returns}
+    for i, one in enumerate(returns):
+        for j, other in enumerate(returns):
             if i != j:
-                interval = resamples.improvement(
-                    returns[one] / frames, returns[other] / frames, (i, j)
-                )
+                interval = resamples.improvement(returns[one], returns[other], (i, j))
                 found[one][other] = {
                     **interval.named("probability"),
-                    "significant": is_significant(interval),
+                    "significant": leaves_out(interval, 0.5),
                 }
     return found
-
-
-def is_significant(probability: Interval) -> bool:
-    """Whether the interval of a probability of improvement leaves out even chances."""
-    # Sums of halves are rounded.
-    return not probability.low - ROUNDING <= 0.5 <= probability.high + ROUNDING

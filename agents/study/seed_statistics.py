@@ -83,8 +83,12 @@ class Resamples:
         policy : int
             Number of the policy.
         """
+        return self.interval(float(interquartile_mean(point)), self.seed_means(drawn, policy))
+
+    def seed_means(self, drawn: np.ndarray, policy: int) -> np.ndarray:
+        """Interquartile mean [B] over the seeds that each resample drew, of `drawn` [B, S]."""
         chosen = np.take_along_axis(drawn, self.seeds(policy, drawn.shape[1]), axis=1)
-        return self.interval(float(interquartile_mean(point)), interquartile_mean(chosen))
+        return interquartile_mean(chosen)
 
     def improvement(
         self, one: np.ndarray, other: np.ndarray, policies: tuple[int, int]

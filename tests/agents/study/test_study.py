@@ -8,8 +8,11 @@ import yaml
 
 from agents.cli.entry import main
 from agents.config.study_plan import StudyPlan
+from agents.evaluation.play import drive_seeds, make_envs, play_drives
 from agents.evaluation.price_sweep import PlayedFront
+from agents.evaluation.study import tune_families
 from agents.optimum.fronts import Front
+from agents.policies.learned import load_policy
 from agents.study import job_runs
 from agents.study.job_results import JobResult, read_result, stands, write_result
 from agents.study.jobs import jobs_of
@@ -36,6 +39,10 @@ def files(tmp_path, tiny_kwargs):
     for name, content in {"short": env, "fast": FAST, "linear": {**FAST, "hidden": []}}.items():
         (tmp_path / f"{name}.yaml").write_text(yaml.safe_dump(content))
     return tmp_path
+
+
+ELSEWHERE = {"source": "short", "policies": ["fixed"], "tables": {"hot": {}}}
+"""A transfer that is possible."""
 
 
 def plan_of(files, **changes):
@@ -75,6 +82,30 @@ def test_jobs_are_policies_x_presets_x_seeds(files):
             "ablations.x.policy is 'ppo', which learns by ppo; expected a regression",
         ),
         (
+            {"ablations": {"x": {"policy": "ppo", "agent": {"ppo": {"horizon": 1}}}}},
+            "ablations.x.agent: unknown key ppo.horizon; expected one of total_steps",
+        ),
+        (
+            {"transfer": {"policies": ["fixed"], "tables": {"hot": {}}}},
+            "transfer.source has 'default'; expected of short",
+        ),
+        (
+            {"transfer": {**ELSEWHERE, "policies": ["ppo"]}},
+            "transfer.policies has 'ppo'; expected of fast, linear, random, fixed, no_heat",
+        ),
+        (
+            {"transfer": {**ELSEWHERE, "tables": {"short": {}}}},
+            "transfer.tables has 'short', which is a preset's",
+        ),
+        (
+            {"transfer": {**ELSEWHERE, "tables": {"moon": {"preset": "moon"}}}},
+            "transfer.tables.moon.preset: env is 'moon'; expected one of battery",
+        ),
+        (
+            {"transfer": {**ELSEWHERE, "tables": {"dim": {"env": {"laser": {"watts": 1}}}}}},
+            "transfer.tables.dim.env: unknown key laser.watts; expected one of name, optical_pow",
+        ),
+        (
             {"ablations": {"x": {"policy": "regression", "unseen": ["mood"]}}},
             "ablations.x.unseen: feature_names has no 'mood'",
         ),
@@ -107,14 +138,92 @@ def test_the_study_that_ships_can_be_read():
     plan = read_config(StudyPlan, configs_dir() / "study" / "results.yaml")
     jobs = jobs_of(plan)
     assert len(plan.seeds) >= 5
-    # References and fifteen rules once; five learners and random with each seed; three ablations.
-    assert len(jobs) == 5 * (1 + 15 + 6 * len(plan.seeds)) + 3 * len(plan.seeds)
+    # References and fifteen rules once; five learners and random with each seed; four ablations.
+    default = 1 + 15 + (6 + 4) * len(plan.seeds)
+    # References and two rules; two learners and random with each seed.
+    assert len(jobs) == default + len(plan.transfer.tables) * (1 + 2 + 3 * len(plan.seeds))
+    greedy = next(job for job in jobs if job.policy == "greedy")
+    assert greedy.config.agent.regression.horizon == 1
+
+
+def test_a_preset_may_have_some_of_the_policies_alone(files):
+    plan = plan_of(
+        files, ablations={}, presets={"hot": ["random"], str(files / "short.yaml"): "all"}
+    )
+    names = [job.name for job in jobs_of(plan) if job.table == "hot"]
+    assert sorted(names) == ["hot/random-0", "hot/random-1", "hot/references-0"]
+    with pytest.raises(ConfigError, match=r"presets\.hot has 'ppo'; expected of fast, linear"):
+        jobs_of(plan_of(files, presets={"hot": ["ppo"]}, ablations={}))
 
 
 def run_here(jobs, folder):
     """Every job, in this process."""
+    banks = job_runs.banks_of(jobs)
     for job in jobs:
-        job_runs.run_job(job, folder, job.depends_on(job_runs.bank_of(job.config.env)))
+        job_runs.run_job(job, folder, job.depends_on(banks))
+
+
+@pytest.fixture
+def transferred(files):
+    """Jobs of a scheduler and a rule of the short preset, played on a longer drive in the heat."""
+    elsewhere = {
+        "source": "short",
+        "policies": ["fast", "snr_threshold"],
+        "tables": {
+            "heat": {
+                "preset": str(files / "short.yaml"),
+                "env": {"laser": {"ambient_k": [320.0, 325.0]}, "reward": {"power": 0.05}},
+            }
+        },
+    }
+    policies = [str(files / "fast.yaml"), "snr_threshold"]
+    return jobs_of(plan_of(files, policies=policies, ablations={}, seeds=[0], transfer=elsewhere))
+
+
+def test_a_transfer_plays_what_was_trained_and_tuned_on_its_source(files, transferred, monkeypatch):
+    out = files / "out"
+    jobs = {job.name: job for job in transferred}
+    assert set(jobs) == {
+        f"{table}/{row}-0"
+        for table in ("short", "heat")
+        for row in ("references", "fast", "snr_threshold")
+    }
+    run_here([job for job in transferred if job.source is None], out)
+    monkeypatch.setattr(job_runs, "train_scheduler", lambda *_: pytest.fail("trained anew"))
+    run_here([job for job in transferred if job.source is not None], out)
+    # The scheduler as it was saved, played there step by step.
+    place = jobs["heat/fast-0"].config
+    assert place.env.laser.ambient_k == (320.0, 325.0)
+    envs = make_envs(place.env, "test", 2, "Disabled")
+    scheduler = load_policy(out / "short" / "fast-0")
+    front = read_result(out / "heat" / "fast-0").fronts["front"]
+    assert front.prices == (0.02, 0.05, 0.1), "those of the study, and that of the place"
+    for point, price in enumerate(front.prices):
+        played = play_drives(scheduler, envs, drive_seeds(place.study, 2), price=price)
+        assert played.returns_at(price).mean() == pytest.approx(
+            front.returns[:, point].sum() / front.front.frames.sum()
+        )
+    # The rule is that of the source's validation drives, at each of these prices.
+    rule = read_result(out / "heat" / "snr_threshold-0").fronts["front"]
+    home = jobs["short/snr_threshold-0"].config
+    study = home.study.model_copy(update={"families": ("snr_threshold",), "prices": front.prices})
+    tuned = tune_families(home.model_copy(update={"study": study}))["snr_threshold"]
+    assert rule.policies == tuple(str(tuned[price].policy) for price in front.prices)
+
+
+def test_what_a_transfer_plays_depends_on_the_training_of_its_source(transferred):
+    banks = {"short": "one", "heat": "two"}
+    jobs = {job.name: job for job in transferred}
+    told = jobs["heat/fast-0"].depends_on(banks)
+    assert told["source"] == jobs["short/fast-0"].depends_on(banks)
+    assert "source" not in jobs["heat/references-0"].depends_on(banks)
+
+
+def test_a_transfer_of_what_has_not_been_trained_is_refused(files, transferred):
+    out = files / "out"
+    (job,) = (job for job in transferred if job.name == "heat/fast-0")
+    with pytest.raises(ValueError, match="short/fast-0, which trains its scheduler, has no result"):
+        run_here([job], out)
 
 
 def test_a_study_is_played_kept_and_measured(files, monkeypatch):
@@ -133,6 +242,11 @@ def test_a_study_is_played_kept_and_measured(files, monkeypatch):
     )
     fast = table["rows"]["fast"]["return"]
     assert fast["low"] <= fast["iqm"] <= fast["high"] and len(fast["seeds"]) == 2
+    assert table["kinds"]["fixed"] == "rule" and set(table["differences"]) | {table["best"]} == set(
+        table["rows"]
+    )
+    families = table["groups"]["family"]
+    assert sum(group["clips"] for group in families.values()) == table["clips"]
     # The return at the price of the preset is that of the point that was played at it.
     rows = table["fronts"]["fast"]
     assert fast["seeds"] == pytest.approx(

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from agents.config.study_config import StudyConfig
-from agents.study.leaderboard import is_significant
 from agents.study.seed_statistics import Resamples, interquartile_mean
+from agents.study.table_fronts import leaves_out
 
 STUDY = StudyConfig(bootstrap_draws=400)
 CLIPS = 12
@@ -28,10 +28,10 @@ def test_interquartile_mean_leaves_out_a_quarter_at_either_end():
 def test_policies_that_are_identical_improve_as_often_as_not(resamples):
     same = resamples.improvement(SCORES, SCORES, (0, 1))
     assert same.value == pytest.approx(0.5)
-    assert same.low < 0.5 < same.high and not is_significant(same)
+    assert same.low < 0.5 < same.high and not leaves_out(same, 0.5)
     rule = resamples.improvement(SCORES[:1], SCORES[:1], (0, 1))
     assert (rule.low, rule.high) == pytest.approx((0.5, 0.5)), "ties count half"
-    assert not is_significant(rule)
+    assert not leaves_out(rule, 0.5)
 
 
 def test_a_policy_that_is_better_everywhere_improves_for_certain(resamples):
@@ -40,7 +40,7 @@ def test_a_policy_that_is_better_everywhere_improves_for_certain(resamples):
         {"value": 1.0, "low": 1.0, "high": 1.0}
     )
     less = resamples.improvement(SCORES, more, (0, 1))
-    assert less.value == 0.0 and is_significant(less)
+    assert less.value == 0.0 and leaves_out(less, 0.5)
 
 
 def test_improvement_is_counted_over_clips_and_pairs_of_seeds(resamples):

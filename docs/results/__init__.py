@@ -1,0 +1,1 @@
+"""Parts of the page of a study: its answer, its tables, its picture."""
