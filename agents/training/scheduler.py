@@ -10,9 +10,9 @@ import numpy as np
 
 from agents.config import DemoConfig
 from agents.evaluation import FIXED_POLICIES, drive_seeds, make_envs
-from agents.policies import Scheduler
+from agents.policies import Provenance, Scheduler, load_policy
 from agents.training.branching import Branches
-from agents.training.checkpoint import Validate, training_drives
+from agents.training.checkpoint import Validate, provenance_of, training_drives
 from agents.training.ppo import PpoTrainer
 from agents.training.q_learning import QLearner
 from agents.training.regression import RegressionTrainer
@@ -34,7 +34,7 @@ def train_scheduler(config: DemoConfig, out: Path) -> Scheduler:
     """Train on training drives, where the learner can from its checkpoint in `out`.
 
     The policy with the best return on validation drives, over all prices, is kept;
-    `validation.json` has what it reaches on others.
+    `validation.json` has what it gains on others. A run that is at its end is not begun again.
 
     Raises
     ------
@@ -44,6 +44,8 @@ def train_scheduler(config: DemoConfig, out: Path) -> Scheduler:
         The learner, or TensorBoard, needs a package that is not installed.
     """
     env, agent = priced(config.env, config.agent.power_price), config.agent
+    if (policy := finished(provenance_of(agent, FEATURE_NAMES, env), out)) is not None:
+        return policy
     count = config.study.tuning_drives
     if agent.algorithm == "regression":
         count = agent.regression.validation_drives
@@ -59,6 +61,19 @@ def train_scheduler(config: DemoConfig, out: Path) -> Scheduler:
     others = branches_of(env, "validation", seeds[count:])
     rescore(policy, judging, others, prices, out)
     return policy
+
+
+def finished(run: Provenance, out: Path) -> Scheduler | None:
+    """What such a run has left in `out`, where it is at its end: what is written last stands."""
+    if not (out / VALIDATION).is_file():
+        return None
+    policy = load_policy(out)
+    return policy if same_run(policy.provenance, run) else None
+
+
+def same_run(one: Provenance, other: Provenance) -> bool:
+    """Whether two runs are told the same; versions of packages may differ."""
+    return one.model_copy(update={"versions": other.versions}) == other
 
 
 def _trained(
