@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from agents.report.results import in_a_sentence, label
+from agents.report.results import OPTIMUM, in_a_sentence, label
 
 Told = Mapping[str, float]
 """An interval: "low", "high", and the point estimate as "mean" or "difference"."""
 LEAST_SHARE: Final = 0.005
 """Shares below are shown as 0 %."""
 BLIND: Final = "blind"
-OPTIMUM: Final = "optimum"
 
 
 def verdict(results: dict[str, Any]) -> str:

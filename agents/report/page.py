@@ -19,11 +19,14 @@ from agents.report.answer import (
     percent,
     verdict,
 )
+from agents.report.choice_charts import choice_map
+from agents.report.drive_charts import OFF_COLOR, rows_told, timeline
 from agents.report.results import (
+    CHOICES,
     FRAMES,
+    OPTIMUM,
     RESULTS,
     TIMELINE,
-    TODAY,
     Strip,
     label,
     read_json,
@@ -46,10 +49,10 @@ def write_report(folder: Path) -> Path:
     ValueError
         A file of the results is missing or damaged; the message names it.
     """
-    results, played = read_json(folder / RESULTS), read_json(folder / TIMELINE)
+    results, played, choices = (read_json(folder / name) for name in (RESULTS, TIMELINE, CHOICES))
     strip = read_strip(folder / FRAMES) if results.get("every", 1) == 1 else None
     try:
-        page = render_page(results, played, strip)
+        page = render_page(results, played, choices, strip)
     except (KeyError, IndexError, TypeError, jinja2.UndefinedError) as error:
         raise ValueError(
             f"{folder} holds results that this version cannot show ({error!r}); "
@@ -59,7 +62,9 @@ def write_report(folder: Path) -> Path:
     return folder / REPORT
 
 
-def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip | None) -> str:
+def render_page(
+    results: dict[str, Any], played: dict[str, Any], choices: dict[str, Any], strip: Strip | None
+) -> str:
     """The page as text; without frames where there is no strip of them."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
@@ -81,15 +86,22 @@ def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip | 
         rows=_rows(results),
         cards=_cards(results),
         panels=[{"key": key, "title": panel.title, **panel.scale} for key, panel in panels.items()],
-        frames=json.dumps(_frames(strip, panels)) if strip else None,
+        frames=json.dumps(_frames(strip, panels, played["trip_k"])) if strip else None,
         families=list(dict.fromkeys(strip.family.tolist())) if strip else [],
         fronts=charts.figure_html(charts.fronts(results)),
         shares=charts.figure_html(charts.shares_by_family(results, compared)),
-        timeline=charts.figure_html(charts.timeline(played, scheduler, TODAY)),
+        choice_maps=[charts.figure_html(choice_map(one)) for one in choices["maps"]],
+        timeline=charts.figure_html(timeline(played, scheduler), "timeline"),
         drive=played["drive"],
+        drive_price=played["power_price"],
+        drive_families=json.dumps(played["family"]),
+        drive_rows=json.dumps(rows_told(played, scheduler)),
+        frame_rate_hz=played["frame_rate_hz"],
+        optimum_known=OPTIMUM in played["policies"],
         split=results["config"]["study"]["split"],
         price=_price(results),
         shot_colors={str(shots): color for shots, color in charts.SHOT_COLORS.items()},
+        off_color=OFF_COLOR,
         plotly=get_plotlyjs(),  # all 4 MB of it: the page is read without a network
     )
 
@@ -231,8 +243,9 @@ def scored_m(strip: Strip, i: int) -> np.ndarray:
     return np.where(strip.truth_m[i] <= strip.max_range_m, strip.truth_m[i], np.nan)
 
 
-def _frames(strip: Strip, panels: dict[str, Panel]) -> list[dict[str, Any]]:
+def _frames(strip: Strip, panels: dict[str, Panel], trip_k: float) -> list[dict[str, Any]]:
     """Pictures and caption of every frame of the strip."""
+    known = len(strip.optimum_shots) > 0
     return [
         {
             "family": str(strip.family[i]),
@@ -241,6 +254,15 @@ def _frames(strip: Strip, panels: dict[str, Panel]) -> list[dict[str, Any]]:
             "shots": int(strip.shots[i]),
             "mae": None if np.isnan(strip.depth_mae_m[i]) else float(strip.depth_mae_m[i]),
             "valid": float(strip.valid[i].mean()),
+            "celsius": float(strip.temperature_k[i] - 273.15),
+            "margin": float(trip_k - strip.temperature_k[i]),
+            "energy": float(strip.laser_energy_j[i]),
+            "best": {
+                "shots": int(strip.optimum_shots[i]),
+                "energy": float(strip.optimum_energy_j[i]),
+            }
+            if known
+            else None,
             "images": {
                 key: picture(panel.values(strip, i), panel.colors) for key, panel in panels.items()
             },

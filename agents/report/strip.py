@@ -18,8 +18,13 @@ from unwrap.signal import Shots, unambiguous_range_m
 FRAMES_PER_FAMILY = 8  # assumed: enough to see the scene move, in a page of some MB
 
 
-def take_strip(problem: Problem, played: PlayedDrives) -> Strip:
-    """A run of frames of each scene family in `played`, taken again with the same noise."""
+def take_strip(
+    problem: Problem, played: PlayedDrives, optimum: PlayedDrives | None = None
+) -> Strip:
+    """A run of frames of each scene family in `played`, taken again with the same noise.
+
+    `optimum` is of the drives of `runs_to_show`, among others or not; None where it is not known.
+    """
     chosen = list(runs_to_show(played))
     drives = {row: drive_of(problem, int(played.seeds[row])) for row, _ in chosen}
     images = []
@@ -39,14 +44,23 @@ def take_strip(problem: Problem, played: PlayedDrives) -> Strip:
                 "valid": made.depth.valid[0].numpy(),
             }
         )
-    where = tuple(np.array(chosen).T)
+    where = drives_shown, frames_shown = tuple(np.array(chosen).T)
+    best_shots, best_energy_j = np.empty(0, np.int64), np.empty(0)
+    if optimum is not None:
+        rows = [optimum.seeds.tolist().index(seed) for seed in played.seeds[drives_shown]]
+        best_shots = optimum.shots[rows, frames_shown]
+        best_energy_j = optimum.laser_energy_j.cumsum(axis=1)[rows, frames_shown]
     return Strip(
         **{name: np.stack([one[name] for one in images]) for name in images[0]},
         shots=played.shots[where],
-        frame=where[1],
+        frame=frames_shown,
         depth_mae_m=played.depth_mae_m[where],
+        temperature_k=played.temperature_k[where],
+        laser_energy_j=played.laser_energy_j.cumsum(axis=1)[where],
+        optimum_shots=best_shots,
+        optimum_energy_j=best_energy_j,
         family=played.family[where],
-        drive=played.seeds[where[0]],
+        drive=played.seeds[drives_shown],
         unambiguous_m=np.asarray(unambiguous_range_m(problem.config.sensor.f1_hz)),
         max_range_m=np.asarray(problem.config.sensor.max_range_m),
     )
