@@ -56,14 +56,15 @@ def choice_map(told: dict[str, Any]) -> go.Figure:
 
 def _axis(told: dict[str, Any], cells: int) -> dict[str, Any]:
     """Ticks between the cells, or at their middles where each stands for one number."""
-    marks, edges = told.get("marks"), told.get("edges")
+    if "marks" in told:
+        values, texts = np.arange(cells) + 0.5, told["marks"]
+    else:
+        # Past the last edge that is a number lies everything above.
+        values, texts = np.arange(cells + 1.0), told["edges"]
     return {
         "title": told["title"] + (f", {told['unit']}" if told["unit"] else ""),
-        "tickvals": (np.arange(cells) + 0.5 if marks else np.arange(cells + 1)).tolist(),
-        # Past the last edge that is a number lies everything above.
-        "ticktext": [f"{x:g}" for x in marks]
-        if marks
-        else ["" if x is None else f"{x:g}" for x in edges],
+        "tickvals": values.tolist(),
+        "ticktext": ["" if text is None else f"{text:g}" for text in texts],
         "range": [0, cells],
         "tickangle": 0,
         **AXIS,

@@ -68,13 +68,13 @@ def choice_maps(played: Sequence[PlayedDrives], range_m: float) -> list[dict[str
         lambda one: _observed(one, SNR_FEATURE),
     )
     distance = Axis(
-        "mean distance that the network predicts",
+        "mean predicted distance",
         "m",
         np.arange(0.0, 2.0 * range_m + DISTANCE_STEP_M, DISTANCE_STEP_M),
         lambda one: range_m * _observed(one, "network_distance"),
     )
     margin = Axis(
-        "temperature below the laser's trip",
+        "below the laser's trip",
         "K",
         np.array(MARGINS_K),
         lambda one: heat_margin_k(_observed(one, "heat_margin")),
@@ -95,7 +95,7 @@ def _observed(played: PlayedDrives, name: str) -> np.ndarray:
 
 def _around(marks: Sequence[float]) -> np.ndarray:
     """Edges with one of the rising `marks` between two each."""
-    between = np.convolve(marks, (0.5, 0.5), "valid")
+    between = (np.array(marks[1:]) + np.array(marks[:-1])) / 2.0
     return np.concatenate(([-np.inf], between, [np.inf]))
 
 
@@ -124,9 +124,9 @@ def _of_interest(played: PlayedDrives, values: np.ndarray) -> np.ndarray:
 
 
 def _occupied(frames: np.ndarray) -> slice:
-    """From the first to the last cell that has frames."""
+    """From the first to the last cell that has frames; all cells where none has."""
     there = np.flatnonzero(frames)
-    return slice(int(there[0]), int(there[-1]) + 1) if len(there) else slice(0, 0)
+    return slice(int(there[0]), int(there[-1]) + 1) if len(there) else slice(0, len(frames))
 
 
 def _told(axis: Axis, cells: slice) -> dict[str, Any]:

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import pytest
 import torch
-from report_sample import made_up_results, made_up_strip, made_up_timeline
+from report_sample import made_up_choices, made_up_results, made_up_strip, made_up_timeline
 from safetensors.torch import load_file
 
 from agents.cli.doctor import Finding
 from agents.cli.entry import COMMANDS, main
 from agents.policies.learned import load_policy
-from agents.report.results import FRAMES, RESULTS, TIMELINE, write_strip
+from agents.report.results import CHOICES, FRAMES, RESULTS, TIMELINE, write_strip
 from agents.training.branching import Branches
 from agents.training.checkpoint import CHECKPOINT
 from shotenv.config.families import FAMILIES
@@ -190,6 +190,7 @@ def test_a_damaged_bank_is_told_from_a_good_one(capsys, tmp_path, tiny_bank):
 def test_report_is_written_anew(capsys, tmp_path):
     write_json(tmp_path / RESULTS, made_up_results())
     write_json(tmp_path / TIMELINE, made_up_timeline())
+    write_json(tmp_path / CHOICES, made_up_choices())
     write_strip(tmp_path / FRAMES, made_up_strip())
     status, out, _ = run(capsys, "report", tmp_path)
     assert status == 0 and out.strip() == str(tmp_path / "report.html")
