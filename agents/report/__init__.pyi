@@ -1,4 +1,5 @@
 from .answer import details as details, verdict as verdict
+from .comparison import write_comparison as write_comparison
 from .evaluation_files import write_evaluation as write_evaluation
 from .page import write_report as write_report
 from .scoreboard import lines_of as lines_of, match_picture as match_picture

@@ -78,7 +78,7 @@ def fronts(results: dict[str, Any]) -> go.Figure:
             textfont={"color": color, "size": 11},
             legendgroup=name,
             name=text,
-            customdata=[_point(row) for row in rows],
+            customdata=[point_told(row) for row in rows],
             hovertemplate="%{x:.1%}, %{y:.3f} m<br>%{customdata}<extra>" + text + "</extra>",
         )
     for name in FIXED:
@@ -123,7 +123,8 @@ def prices_apart(rows: list[dict[str, Any]]) -> list[str]:
     return labels
 
 
-def _point(row: dict[str, Any]) -> str:
+def point_told(row: dict[str, Any]) -> str:
+    """What was played at a point of a front, and at which price."""
     at = "" if row["price"] is None else f"price {row['price']:g}: "
     return at + textwrap.fill(label(row["policy"]), 60).replace("\n", "<br>")
 

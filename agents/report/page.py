@@ -7,9 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import jinja2
 import numpy as np
-from plotly.offline import get_plotlyjs
 
 from agents.report import charts
 from agents.report.answer import (
@@ -32,6 +30,7 @@ from agents.report.results import (
     read_json,
     read_strip,
 )
+from agents.report.template import CANNOT_SHOW, page_of
 from unwrap.pictures import CYCLIC, ERROR, GRAY, VIRIDIS, ColorMap, picture
 from unwrap.signal import GRAY_FULL_SCALE
 from unwrap.support import write_text
@@ -53,7 +52,7 @@ def write_report(folder: Path) -> Path:
     strip = read_strip(folder / FRAMES) if results.get("every", 1) == 1 else None
     try:
         page = render_page(results, played, choices, strip)
-    except (KeyError, IndexError, TypeError, jinja2.UndefinedError) as error:
+    except CANNOT_SHOW as error:
         raise ValueError(
             f"{folder} holds results that this version cannot show ({error!r}); "
             "`shotenv evaluate` writes them anew"
@@ -66,16 +65,12 @@ def render_page(
     results: dict[str, Any], played: dict[str, Any], choices: dict[str, Any], strip: Strip | None
 ) -> str:
     """The page as text; without frames where there is no strip of them."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,  # by default a misspelt name would print nothing
-    )
     panels = panels_of(strip, results["config"]["env"]["sensor"]["f1_hz"]) if strip else {}
     scheduler = results["scheduler"]
     # The best rule is what the scheduler has to be better than to be worth its training.
     compared = tuple(name for name in (scheduler, best_rule(results)) if name)
-    return environment.get_template("report.html.jinja").render(
+    return page_of(
+        "report.html.jinja",
         results=results,
         verdict=verdict(results),
         details=details(results),
@@ -102,7 +97,6 @@ def render_page(
         price=_price(results),
         shot_colors={str(shots): color for shots, color in charts.SHOT_COLORS.items()},
         off_color=OFF_COLOR,
-        plotly=get_plotlyjs(),  # all 4 MB of it: the page is read without a network
     )
 
 

@@ -130,7 +130,13 @@ def made_up_results(
             for name in NAMES
         },
         "config": {
-            "env": {"sensor": {"f1_hz": f1_hz}, "reward": {"power": [0.09, 0.09]}},
+            "env": {
+                "bank": "pocket",
+                "families": [],
+                "frames_per_drive": 256,
+                "sensor": {"f1_hz": f1_hz},
+                "reward": {"power": [0.09, 0.09]},
+            },
             "study": {"split": split},
         },
     }

@@ -197,6 +197,21 @@ def test_report_is_written_anew(capsys, tmp_path):
     assert (tmp_path / "report.html").stat().st_size > 10**6
 
 
+def test_reports_of_several_evaluations_are_compared(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, f1_hz in (("wide", 10e6), ("fine", 24e6)):
+        write_json(tmp_path / name / RESULTS, made_up_results(f1_hz=f1_hz))
+    status, out, _ = run(capsys, "report", "wide", "fine")
+    assert status == 0 and out == "runs/comparison.html\n"
+    status, out, _ = run(capsys, "report", "wide", "fine", "--out", "both.html")
+    assert status == 0 and out == "both.html\n"
+    assert "2 evaluations: wide, fine" in (tmp_path / "both.html").read_text()
+    status, _, err = run(capsys, "report", "wide", "--out", "both.html")
+    assert status == 2 and "out is both.html; expected with several folders alone" in err
+    status, _, err = run(capsys, "report", "wide", "wide/")
+    assert status == 1 and "results has wide twice" in err
+
+
 def test_demo_does_the_main_job(capsys, tmp_path, tiny):
     out = tmp_path / "demo"
     small = "--agent.ppo.total_steps 64 --agent.ppo.num_envs 2 --agent.ppo.rollout_steps 16"
