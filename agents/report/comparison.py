@@ -142,7 +142,10 @@ def drives_told(every: Sequence[dict[str, Any]]) -> str:
 def settings_of(results: dict[str, Any]) -> dict[str, Any]:
     """Everything that was set, by its name, with what it was run with."""
     versions = {f"version of {name}": value for name, value in results["versions"].items()}
-    return {**dict(_flat(results["config"])), "learnt by": results["algorithm"], **versions}
+    configured = dict(_flat(results["config"]))
+    # The drives that are judged are of the study's split, whatever the environment's is.
+    configured.pop("env.split", None)
+    return {**configured, "learnt by": results["algorithm"], **versions}
 
 
 def differing(settings: Sequence[dict[str, Any]]) -> dict[str, list[str]]:
