@@ -22,6 +22,7 @@ from agents.report.drive_charts import OFF_COLOR, rows_told, timeline
 from agents.report.results import (
     CHOICES,
     FRAMES,
+    GRAY_GAMMA,
     OPTIMUM,
     RESULTS,
     TIMELINE,
@@ -37,7 +38,6 @@ from unwrap.support import write_text
 
 REPORT = "report.html"
 LARGEST_ERROR_M = 1.0  # assumed: a wrong wrap is six times that, a right one a tenth
-GRAY_GAMMA = 0.5  # assumed: a linear image is too dark to look at
 
 
 def write_report(folder: Path) -> Path:

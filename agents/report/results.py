@@ -29,6 +29,7 @@ OPTIMUM = "optimum"
 """Dynamic programming, which knows what every choice would bring."""
 RESULTS, DRIVES, CHOICES = "results.json", "drives.csv", "choices.json"
 TIMELINE, FRAMES = "timeline.json", "frames.npz"
+GRAY_GAMMA = 0.5  # assumed: a linear image is too dark to look at
 # Policies without a line here are shown by their names, without underscores.
 LABELS = {
     "snr_threshold": "SNR threshold rule",

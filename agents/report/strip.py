@@ -11,7 +11,7 @@ from torch import Tensor
 from agents.evaluation import PlayedDrives
 from agents.optimum import drive_of
 from agents.report.results import Strip
-from shotenv.decision import Problem, acquire_depth
+from shotenv.decision import Drive, Problem, acquire_depth
 from shotenv.laser import emitted_power_w
 from unwrap.signal import Shots, unambiguous_range_m
 
@@ -27,23 +27,7 @@ def take_strip(
     """
     chosen = list(runs_to_show(played))
     drives = {row: drive_of(problem, int(played.seeds[row])) for row, _ in chosen}
-    images = []
-    for row, frame in chosen:
-        drive, step = drives[row], torch.tensor([frame])
-        # A derated laser's power follows its temperature before the frame: `temperature_k` is that
-        # after it, so the one of the frame before counts.
-        before_k = torch.tensor(played.temperature_k[[row], frame - 1]) if frame else drive.start_k
-        power_w = emitted_power_w(drive.laser_power_w, before_k, problem.config.laser)
-        made = acquire_depth(problem, drive, step, Shots(int(played.shots[row, frame])), power_w)
-        images.append(
-            {
-                "gray_lsb": problem.bank.gray(drive.frame(step))[0].numpy(),
-                "wrapped_m": _half(made.depth.wrapped_m[0]),
-                "corrected_m": _half(made.depth.distance_m[0]),
-                "truth_m": _half(made.truth_m[0]),
-                "valid": made.depth.valid[0].numpy(),
-            }
-        )
+    images = [taken_again(problem, drives[row], played, row, frame) for row, frame in chosen]
     where = drives_shown, frames_shown = tuple(np.array(chosen).T)
     best_shots, best_energy_j = np.empty(0, np.int64), np.empty(0)
     if optimum is not None:
@@ -64,6 +48,30 @@ def take_strip(
         unambiguous_m=np.asarray(unambiguous_range_m(problem.config.sensor.f1_hz)),
         max_range_m=np.asarray(problem.config.sensor.max_range_m),
     )
+
+
+def taken_again(
+    problem: Problem, drive: Drive, played: PlayedDrives, row: int, frame: int
+) -> dict[str, np.ndarray]:
+    """Images of a frame of `drive`, which is row `row` of `played`, by the names of a `Strip`.
+
+    [H, W] each; of a frame without laser there is the gray image alone.
+    """
+    step, shots = torch.tensor([frame]), int(played.shots[row, frame])
+    gray = {"gray_lsb": problem.bank.gray(drive.frame(step))[0].numpy()}
+    if not shots:
+        return gray
+    # A derated laser's power follows its temperature before the frame: `temperature_k` is that
+    # after it, so the one of the frame before counts.
+    before_k = torch.tensor(played.temperature_k[[row], frame - 1]) if frame else drive.start_k
+    power_w = emitted_power_w(drive.laser_power_w, before_k, problem.config.laser)
+    made = acquire_depth(problem, drive, step, Shots(shots), power_w)
+    return gray | {
+        "wrapped_m": _half(made.depth.wrapped_m[0]),
+        "corrected_m": _half(made.depth.distance_m[0]),
+        "truth_m": _half(made.truth_m[0]),
+        "valid": made.depth.valid[0].numpy(),
+    }
 
 
 def runs_to_show(played: PlayedDrives) -> Iterator[tuple[int, int]]:
