@@ -1,4 +1,4 @@
-"""The command that writes drives as a data set of Minari."""
+"""Commands that write drives for others to read: a data set of Minari, a recording for Rerun."""
 
 from __future__ import annotations
 
@@ -67,4 +67,40 @@ def collect(arguments: Namespace) -> int:
     return DONE
 
 
-COMMANDS = (Command("collect", "write drives as a Minari data set", collect_arguments, collect),)
+def record_arguments(parser: ArgumentParser) -> None:
+    """Which file, which drive, who plays it, and the experiment."""
+    parser.add_argument("file", type=Path, help="recording to write, such as runs/drive.rrd")
+    parser.add_argument(
+        "--policy", default="always_8", help="random, always_2, _4 or _8, or a scheduler's folder"
+    )
+    parser.add_argument("--seed", type=NonNegativeInt, default=0, help="seed of the drive")
+    add_experiment(parser)
+
+
+def record(arguments: Namespace) -> int:
+    """Play a drive and write it."""
+    from agents.evaluation import make_envs, play_drives
+    from agents.report import require_rerun, write_recording
+    from shotenv.decision import open_problem
+
+    require_rerun()  # before minutes are spent
+    policy, config = policy_of("policy", arguments.policy), experiment_of(arguments)
+    prepare_bank(config.env)
+    play_on_one_thread()
+    problem = open_problem(config.env)
+    envs = make_envs(config.env, config.env.split, 1, "Disabled")
+    played = play_drives(policy, envs, [arguments.seed])
+    frames, name = config.env.frames_per_drive, Path(arguments.policy).name
+    with progress(frames, "writing the drive", "frame") as bar:
+        write_recording(
+            arguments.file, problem, played, f"drive {arguments.seed}, {name}", tick=bar.update
+        )
+    print(f"{frames} frames are in {arguments.file}; `rerun {arguments.file}` shows them.")
+    write_numbers(arguments, {name: float(values[0]) for name, values in played.per_drive.items()})
+    return DONE
+
+
+COMMANDS = (
+    Command("collect", "write drives as a Minari data set", collect_arguments, collect),
+    Command("rerun", "write a drive for the Rerun viewer", record_arguments, record),
+)

@@ -22,6 +22,8 @@ from unwrap.support import say, write_json
 if TYPE_CHECKING:
     from agents.evaluation import Evaluation
 
+COMPARISON = Path("runs/comparison.html")
+
 
 def demo_arguments(parser: ArgumentParser) -> None:
     """The experiment, and where its results go."""
@@ -108,15 +110,32 @@ def publish(arguments: Namespace, config: DemoConfig, evaluation: Evaluation) ->
 
 
 def report_arguments(parser: ArgumentParser) -> None:
-    """Which results."""
-    parser.add_argument("results", type=Path, help="folder that an evaluation wrote")
+    """Which results, and where a comparison of several goes."""
+    parser.add_argument(
+        "results", type=Path, nargs="+", help="folder that an evaluation wrote; several: compared"
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help=f"page that compares several evaluations; {COMPARISON} by default",
+    )
 
 
 def report(arguments: Namespace) -> int:
-    """Write the page of an evaluation anew."""
-    from agents.report import write_report
+    """Write the page of an evaluation anew, or one that compares several."""
+    from agents.report import write_comparison, write_report
 
-    print(write_report(arguments.results))
+    folders, out = arguments.results, arguments.out
+    if len(folders) > 1:
+        print(write_comparison(folders, out or COMPARISON))
+    elif out is None:
+        print(write_report(folders[0]))
+    else:
+        raise ConfigError(
+            f"out is {out}; expected with several folders alone: the page of one evaluation is "
+            "written beside its results"
+        )
     return DONE
 
 
@@ -178,5 +197,10 @@ COMMANDS = (
         run_study,
         resumes=True,
     ),
-    Command("report", "write the report of an evaluation anew", report_arguments, report),
+    Command(
+        "report",
+        "write the report of an evaluation anew, or compare several on one page",
+        report_arguments,
+        report,
+    ),
 )

@@ -13,6 +13,7 @@ from .play import (
     drive_seeds as drive_seeds,
     make_envs as make_envs,
     play_drives as play_drives,
+    play_optimum as play_optimum,
 )
 from .price_sweep import (
     PlayedFront as PlayedFront,

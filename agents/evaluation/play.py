@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -10,9 +10,10 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 
 from agents.config import StudyConfig
-from agents.optimum import by_clip
-from agents.policies import FixedPolicy, Policy
+from agents.optimum import by_clip, clairvoyant, tabulate
+from agents.policies import Action, FixedPolicy, Observation, Policy
 from shotenv.config import EnvConfig
+from shotenv.decision import Problem
 from shotenv.env import ShotScheduleVectorEnv
 from unwrap.signal import Shots
 
@@ -30,6 +31,10 @@ class PlayedDrives:
         Seeds of the drives.
     shots : int64 [N, T]
         Samples taken; 0 where the laser was off.
+    asked : int64 [N, T]
+        Samples asked for.
+    observations : float32 [N, T, D]
+        What the policy saw of each frame as it chose, features alone.
     reward, laser_energy_j, energy_j, life_used_h, depth_mae_m, wrap_accuracy, within_0p1m, \
 temperature_k : float64 [N, T]
         As in the environment's `info`; error and shares of pixels are NaN where the laser was off.
@@ -48,6 +53,8 @@ temperature_k : float64 [N, T]
 
     seeds: np.ndarray
     shots: np.ndarray
+    asked: np.ndarray
+    observations: np.ndarray
     reward: np.ndarray
     laser_energy_j: np.ndarray
     energy_j: np.ndarray
@@ -204,6 +211,8 @@ def play_drives(
     done = np.zeros(len(seeds), dtype=bool)
     while not done.all():
         actions = policy.act(observations, infos)
+        features = observations["state"] if isinstance(observations, Mapping) else observations
+        seen = np.array(features, dtype=np.float32)
         observations, rewards, terminated, truncated, infos = envs.step(actions)
         done = terminated | truncated
         # Where a drive has ended and the next begun in one step, `infos` tell of the new drive.
@@ -213,6 +222,8 @@ def play_drives(
         frames.append(
             {
                 "shots": np.array(told["shots"], dtype=np.int64),
+                "asked": np.array(told["asked"], dtype=np.int64),
+                "observations": seen,
                 "reward": np.array(rewards, dtype=np.float64),
                 "laser_energy_j": np.array(told["laser_energy_j"]),
                 "energy_j": np.array(told["energy_j"]),
@@ -230,3 +241,58 @@ def play_drives(
         tick(len(seeds))
     stacked = {name: np.stack([frame[name] for frame in frames], axis=1) for name in frames[0]}
     return PlayedDrives(seeds=np.asarray(seeds), power_price=power_price, **stacked)
+
+
+class ReplayPolicy(Policy):
+    """Takes given actions, whatever is observed.
+
+    Parameters
+    ----------
+    actions : int64 [N, T]
+        Of N drives at once; -1 where the laser is off, which asks for nothing.
+    """
+
+    def __init__(self, actions: np.ndarray) -> None:
+        self._actions = np.maximum(actions, 0)
+        self.reset()
+
+    def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
+        """The actions of the next frame."""
+        self._frame += 1
+        return self._actions[:, self._frame]
+
+    def reset(self) -> None:
+        """Begin with the first frame."""
+        self._frame = -1
+
+
+def play_optimum(
+    problem: Problem,
+    seeds: Sequence[int],
+    *,
+    tick: Callable[[int], object] = lambda frames: None,
+) -> PlayedDrives | None:
+    """The drives `seeds` as dynamic programming takes them at each drive's own price of power.
+
+    What it chooses on the table of outcomes is played in the environment, which tells heat and
+    energy, too.
+
+    Parameters
+    ----------
+    problem : Problem
+        That of the drives' split.
+    seeds : sequence of int
+    tick : callable
+        Told the number of frames after each drive whose outcomes are known.
+
+    Returns
+    -------
+    PlayedDrives or None
+        None where the optimum is not known, with a derated laser: what that would measure depends
+        on the choices before.
+    """
+    if problem.config.laser.derate_per_k > 0:
+        return None
+    best = clairvoyant(tabulate(problem, seeds, tick=tick).table())
+    envs = make_envs(problem.config, problem.config.split, len(seeds), "Disabled")
+    return play_drives(ReplayPolicy(best.actions), envs, seeds)

@@ -138,6 +138,7 @@ def play_front(
     prices: Sequence[float],
     *,
     names: Callable[[Policy], str] = str,
+    keep: Callable[[PlayedDrives], object] = lambda played: None,
     tick: Callable[[int], object] = lambda points: None,
 ) -> PlayedFront:
     """Play a family on the drives `seeds`, once for each price.
@@ -152,6 +153,8 @@ def play_front(
     seeds, prices : sequences
     names : callable
         What is written of each policy; its words by default.
+    keep : callable
+        Given the drives of each point, of which the front has sums alone.
     tick : callable
         Told the number of points after each.
     """
@@ -162,6 +165,7 @@ def play_front(
         if policy.reads_price or id(policy) not in before:
             before[id(policy)] = play_drives(policy, envs, seeds, price=price)
         played.append(before[id(policy)])
+        keep(played[-1])
         tick(1)
     return front_from(
         played, [names(policy) for policy in policies], prices, range_m=_range_m(envs)

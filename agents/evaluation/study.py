@@ -57,10 +57,13 @@ class Evaluation:
         Fronts, means, differences in pairs and their intervals: the content of `results.json`.
     played : dict of str to PlayedDrives
         The test drives under each policy, at the price that each drive has.
+    at_prices : list of PlayedDrives
+        Those of the scheduler's front: the same drives, once at each of its prices.
     """
 
     results: dict[str, Any]
     played: dict[str, PlayedDrives]
+    at_prices: list[PlayedDrives]
 
 
 def families_of(study: StudyConfig) -> list[PolicyFamily]:
@@ -121,9 +124,12 @@ def play_fronts(
     tuned: Mapping[str, Mapping[float, Tuned]],
     envs: VectorEnv,
     config: DemoConfig,
-) -> dict[str, PlayedFront]:
-    """Fronts of the scheduler, of the tuned families and of blind choices, on the test drives."""
-    study = config.study
+) -> tuple[dict[str, PlayedFront], list[PlayedDrives]]:
+    """Fronts of the scheduler, of the tuned families and of blind choices, on the test drives.
+
+    The second are the scheduler's drives at each of its prices.
+    """
+    study, own_drives = config.study, list[PlayedDrives]()
     seeds = drive_seeds(study, study.drives)
     own = prices_of(scheduler, study.prices) or (price_of(config.env),)
     points = len(own) + len(tuned) * len(study.prices) + len(FIXED_POLICIES) + len(MIXTURES)
@@ -135,6 +141,7 @@ def play_fronts(
                 seeds,
                 own,
                 names=lambda policy: SCHEDULER,
+                keep=own_drives.append,
                 tick=bar.update,
             )
         }
@@ -147,7 +154,7 @@ def play_fronts(
                 tick=bar.update,
             )
         fronts[BLIND] = play_blind(envs, seeds, tick=bar.update)
-        return fronts
+        return fronts, own_drives
 
 
 def evaluate_scheduler(
@@ -187,7 +194,7 @@ def evaluate_scheduler(
         **FIXED_POLICIES,
     }
     played = play_all(policies, envs, study)
-    fronts = play_fronts(scheduler, tuned, envs, config)
+    fronts, own_drives = play_fronts(scheduler, tuned, envs, config)
     problem = open_problem(config.env.model_copy(update={"split": study.split}))
     optimum, cool_eight_m = table_fronts(problem, study)
 
@@ -208,7 +215,7 @@ def evaluate_scheduler(
     # Every how many pixels each way: only of all of them there are images.
     results["every"] = problem.bank.every
     results["config"] = config.model_dump(mode="json")
-    return Evaluation(results, played)
+    return Evaluation(results, played, own_drives)
 
 
 def table_fronts(problem: Problem, study: StudyConfig) -> tuple[PlayedFront | None, np.ndarray]:

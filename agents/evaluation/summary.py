@@ -172,26 +172,30 @@ def timeline(
     Parameters
     ----------
     played : mapping of str to PlayedDrives
-        The same drives under each policy.
+        The drive under each policy, among others or not.
     drive : int
-        Row of the drive.
+        Row of the drive in the first.
     frame_rate_hz, trip_k, release_k : float
         Of the drives, and temperatures at which their laser trips and comes back.
     """
     first = next(iter(played.values()))
+    seed = int(first.seeds[drive])
+    drives = {name: (one, one.seeds.tolist().index(seed)) for name, one in played.items()}
     return {
-        "drive": int(first.seeds[drive]),
+        "drive": seed,
+        "power_price": float(first.power_price[drive]),
         "frame_rate_hz": frame_rate_hz,
         "trip_k": trip_k,
         "release_k": release_k,
         "family": first.family[drive].tolist(),
         "policies": {
             name: {
-                "shots": one.shots[drive].tolist(),
+                "shots": one.shots[row].tolist(),
                 # JSON knows no NaN.
-                "depth_mae_m": [None if np.isnan(x) else float(x) for x in one.depth_mae_m[drive]],
-                "temperature_k": one.temperature_k[drive].tolist(),
+                "depth_mae_m": [None if np.isnan(x) else float(x) for x in one.depth_mae_m[row]],
+                "temperature_k": one.temperature_k[row].tolist(),
+                "laser_energy_j": one.laser_energy_j[row].tolist(),
             }
-            for name, one in played.items()
+            for name, (one, row) in drives.items()
         },
     }

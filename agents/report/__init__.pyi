@@ -1,6 +1,7 @@
-from .answer import details as details, verdict as verdict
-from .budget_words import budget_lines as budget_lines
+from .answer import budget_lines as budget_lines, details as details, verdict as verdict
+from .comparison import write_comparison as write_comparison
 from .evaluation_files import write_evaluation as write_evaluation
 from .page import write_report as write_report
+from .rerun_file import require_rerun as require_rerun, write_recording as write_recording
 from .scoreboard import lines_of as lines_of, match_picture as match_picture
 from .strip import take_strip as take_strip

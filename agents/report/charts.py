@@ -1,4 +1,4 @@
-"""Charts of the report, as plotly figures."""
+"""Charts of the report, as plotly figures, and the look that all of them share."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ from agents.report.results import label
 from unwrap.signal import Shots
 
 SHOT_COLORS = {Shots.TWO: "#9ecae1", Shots.FOUR: "#4292c6", Shots.EIGHT: "#08407f"}
-LEVELS = (0, *Shots)
-"""Samples taken, bottom to top of the time line; 0: the laser was off."""
 # The colours of the page's style sheet, `report.html.jinja`.
 ACCENT, MUTED, INK = "#c2410c", "#64748b", "#1e293b"
 # Of the rules, by name; others are muted.
@@ -30,14 +28,6 @@ FRONT_STYLES = {
 LABEL_SHARE = 0.045
 """Share of energy that the label of a price takes of the chart's width, on a wide page."""
 FIXED = ("always_2", "always_4", "always_8")
-# Of the families that networks and schedulers are trained on; others share one gray.
-FAMILY_COLORS = {
-    "sunny_road": "#fde68a",
-    "overcast_street": "#d6dde6",
-    "garage": "#e7d3c0",
-    "tunnel": "#cfd3dd",
-    "night_road": "#b7bfdc",
-}
 # The first of these that the reader's machine has: nothing is loaded.
 FONT = {"family": "Inter, system-ui, 'Segoe UI', Roboto, sans-serif", "size": 13, "color": INK}
 AXIS = {"gridcolor": "#e2e8f0", "zeroline": False}
@@ -45,9 +35,9 @@ LEGEND = {"orientation": "h", "x": 1.0, "xanchor": "right", "y": 1.12, "yanchor"
 CONFIG = {"displaylogo": False, "responsive": True, "displayModeBar": False}
 
 
-def figure_html(figure: go.Figure) -> str:
-    """The chart as a piece of HTML; plotly itself is inlined once by the page."""
-    return figure.to_html(full_html=False, include_plotlyjs=False, config=CONFIG)
+def figure_html(figure: go.Figure, name: str | None = None) -> str:
+    """The chart as a piece of HTML, with an id to find it by; the page inlines plotly once."""
+    return figure.to_html(full_html=False, include_plotlyjs=False, config=CONFIG, div_id=name)
 
 
 def fronts(results: dict[str, Any]) -> go.Figure:
@@ -88,7 +78,7 @@ def fronts(results: dict[str, Any]) -> go.Figure:
             textfont={"color": color, "size": 11},
             legendgroup=name,
             name=text,
-            customdata=[_point(row) for row in rows],
+            customdata=[point_told(row) for row in rows],
             hovertemplate="%{x:.1%}, %{y:.3f} m<br>%{customdata}<extra>" + text + "</extra>",
         )
     for name in FIXED:
@@ -114,7 +104,7 @@ def fronts(results: dict[str, Any]) -> go.Figure:
     figure.update_yaxes(title="mean absolute depth error, m", rangemode="tozero", **AXIS)
     # Below the chart: beside it the names would leave a phone no room for the points.
     legend = {"orientation": "h", "x": 0, "y": -0.2, "yanchor": "top", "traceorder": "reversed"}
-    return _styled(figure, height=520, legend=legend)
+    return styled(figure, height=520, legend=legend)
 
 
 def undominated(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -133,7 +123,8 @@ def prices_apart(rows: list[dict[str, Any]]) -> list[str]:
     return labels
 
 
-def _point(row: dict[str, Any]) -> str:
+def point_told(row: dict[str, Any]) -> str:
+    """What was played at a point of a front, and at which price."""
     at = "" if row["price"] is None else f"price {row['price']:g}: "
     return at + textwrap.fill(label(row["policy"]), 60).replace("\n", "<br>")
 
@@ -147,7 +138,7 @@ def shares_by_family(results: dict[str, Any], names: tuple[str, ...]) -> go.Figu
         shares = {"all frames": results["policies"][name]["shots_share"]}
         shares |= results["families"][name]
         # plotly draws the first bar lowest.
-        families = [_family(family) for family in reversed(shares)]
+        families = [family_label(family) for family in reversed(shares)]
         table = np.array(list(reversed(shares.values())))
         for shots, color in SHOT_COLORS.items():
             share_of_shots = table[:, shots.action]
@@ -171,56 +162,13 @@ def shares_by_family(results: dict[str, Any], names: tuple[str, ...]) -> go.Figu
             )
     figure.update_xaxes(range=[0, 1], tickformat=".0%", showgrid=False, zeroline=False)
     figure.update_layout(barmode="stack", bargap=0.28, legend=LEGEND | {"traceorder": "normal"})
-    return _styled(figure, height=360, left=120, top=60)
+    return styled(figure, height=360, left=120, top=60)
 
 
-def timeline(record: dict[str, Any], scheduler: str, fixed: str) -> go.Figure:
-    """Shots, error and laser temperature of one drive, scheduler against a fixed choice."""
-    figure = make_subplots(
-        rows=3,
-        cols=1,
-        shared_xaxes=True,
-        vertical_spacing=0.045,
-        row_heights=[0.24, 0.38, 0.38],
-    )
-    seconds = np.arange(len(record["family"])) / record["frame_rate_hz"]
-    for name, color, width in ((fixed, MUTED, 1.3), (scheduler, ACCENT, 1.9)):
-        played = record["policies"][name]
-        line = {"color": color, "width": width}
-        style = {"line": line, "legendgroup": name, "mode": "lines"}
-        # Shots change from frame to frame, not between: a stair, where the others are lines.
-        stair = {**style, "line": {**line, "shape": "hv"}}
-        levels = [LEVELS.index(shots) for shots in played["shots"]]
-        figure.add_scatter(
-            x=seconds, y=levels, **stair, name=label(name), showlegend=False, row=1, col=1
-        )
-        figure.add_scatter(
-            x=seconds, y=played["depth_mae_m"], **style, name=label(name), row=2, col=1
-        )
-        temperature = np.array(played["temperature_k"]) - 273.15
-        figure.add_scatter(
-            x=seconds, y=temperature, **style, name=label(name), showlegend=False, row=3, col=1
-        )
-    _limit(figure, record["trip_k"], "laser trips")
-    _limit(figure, record["release_k"], "laser comes back")
-    _family_bands(figure, record["family"], record["frame_rate_hz"])
-    names = ["off", *map(str, Shots)]
-    figure.update_yaxes(
-        title="shots", tickvals=list(range(len(LEVELS))), ticktext=names, row=1, **AXIS
-    )
-    # A little beyond the lowest and the highest level: lines on the edge would be cut in half.
-    figure.update_yaxes(range=[-0.35, len(LEVELS) - 0.65], row=1)
-    figure.update_yaxes(title="depth error, m", rangemode="tozero", row=2, **AXIS)
-    figure.update_yaxes(title="laser, °C", row=3, **AXIS)
-    figure.update_xaxes(showgrid=False, zeroline=False)
-    figure.update_xaxes(title="time in the drive, s", row=3)
-    figure.update_layout(hovermode="x", legend=LEGEND | {"y": 1.07})
-    return _styled(figure, height=650, top=80)
-
-
-def _styled(
+def styled(
     figure: go.Figure, *, height: int, left: int = 70, top: int = 20, **layout: Any
 ) -> go.Figure:
+    """The chart in the page's look; margins in pixels."""
     return figure.update_layout(
         template="none",
         font=FONT,
@@ -232,37 +180,6 @@ def _styled(
     )
 
 
-def _family(name: str) -> str:
+def family_label(name: str) -> str:
+    """A scene family's name as it is shown."""
     return name.replace("_", " ")
-
-
-def _limit(figure: go.Figure, temperature_k: float, text: str) -> None:
-    figure.add_hline(
-        y=temperature_k - 273.15,
-        line={"color": INK, "width": 1, "dash": "dot"},
-        annotation={"text": text, "font": {"size": 11, "color": MUTED}},
-        annotation_position="top left",
-        row=3,
-        col=1,
-    )
-
-
-def _family_bands(figure: go.Figure, families: list[str], frame_rate_hz: float) -> None:
-    """Shade each clip in its family's colour, its name above where there is room."""
-    edges = [i for i in range(len(families)) if i == 0 or families[i] != families[i - 1]]
-    for start, end in zip(edges, [*edges[1:], len(families)], strict=True):
-        band = {"x0": start / frame_rate_hz, "x1": end / frame_rate_hz}
-        color = FAMILY_COLORS.get(families[start], "#e2e8f0")
-        shape = {"fillcolor": color, "opacity": 0.38, "line_width": 0, "layer": "below"}
-        figure.add_vrect(**band, **shape)
-        # A clip of less than a twentieth of the drive is too narrow for its name.
-        if end - start >= len(families) / 20:
-            figure.add_annotation(
-                x=(band["x0"] + band["x1"]) / 2,
-                y=1.0,
-                yref="paper",
-                yanchor="bottom",
-                text=_family(families[start]).replace(" ", "<br>"),
-                font={"size": 10, "color": MUTED},
-                showarrow=False,
-            )

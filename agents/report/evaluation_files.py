@@ -5,23 +5,26 @@ from __future__ import annotations
 from pathlib import Path
 
 from agents.config import DemoConfig
-from agents.evaluation import Evaluation, PlayedDrives, drive_rows, timeline
+from agents.evaluation import Evaluation, PlayedDrives, drive_rows, play_optimum, timeline
+from agents.report.choice_maps import choice_maps
 from agents.report.results import (
+    CHOICES,
     DRIVES,
     FRAMES,
+    OPTIMUM,
     RESULTS,
     TIMELINE,
     TODAY,
     write_drives,
     write_strip,
 )
-from agents.report.strip import take_strip
-from shotenv.decision import open_problem
-from unwrap.support import write_json
+from agents.report.strip import runs_to_show, take_strip
+from shotenv.decision import Problem, open_problem
+from unwrap.support import progress, write_json
 
 
 def write_evaluation(evaluation: Evaluation, config: DemoConfig, folder: Path) -> None:
-    """Write `results.json`, `drives.csv`, `timeline.json` and `frames.npz` into `folder`.
+    """Write `results.json` and the files beside it, see `agents/report/results.py`.
 
     A thinned bank has no images: of it there is no `frames.npz`. `results.json` comes last, so
     that a folder that has it has everything.
@@ -30,14 +33,30 @@ def write_evaluation(evaluation: Evaluation, config: DemoConfig, folder: Path) -
     scheduler = played[results["scheduler"]]
     compared = {name: played[name] for name in (results["scheduler"], TODAY)}
     laser, rate_hz = config.env.laser, config.env.frame_rate_hz
+    problem = open_problem(config.env.model_copy(update={"split": config.study.split}))
     # One drive, by a rule and not by hand: the page shows no drive that someone picked.
     shown = drive_to_show(scheduler)
+    with_images = results["every"] == 1
+    pictured = {row for row, _ in runs_to_show(scheduler)} if with_images else set()
+    rows = sorted({shown, *pictured})
+    optimum = best_of(problem, scheduler.seeds[rows].tolist())
+    if optimum is not None:
+        compared[OPTIMUM] = optimum
     write_json(folder / TIMELINE, timeline(compared, shown, rate_hz, laser.trip_k, laser.release_k))
     write_drives(folder / DRIVES, drive_rows(played))
-    problem = open_problem(config.env.model_copy(update={"split": config.study.split}))
-    if results["every"] == 1:
-        write_strip(folder / FRAMES, take_strip(problem, scheduler))
+    if with_images:
+        write_strip(folder / FRAMES, take_strip(problem, scheduler, optimum))
+    write_json(
+        folder / CHOICES, {"maps": choice_maps(evaluation.at_prices, config.env.sensor.max_range_m)}
+    )
     write_json(folder / RESULTS, results)
+
+
+def best_of(problem: Problem, seeds: list[int]) -> PlayedDrives | None:
+    """What the optimum would have done in these drives; None where it is not known."""
+    frames = len(seeds) * problem.config.frames_per_drive
+    with progress(frames, "the optimum of the drives shown", "frame") as bar:
+        return play_optimum(problem, seeds, tick=bar.update)
 
 
 def drive_to_show(played: PlayedDrives) -> int:

@@ -7,37 +7,39 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import jinja2
 import numpy as np
-from plotly.offline import get_plotlyjs
 
 from agents.optimum import STILL_M
 from agents.report import charts
 from agents.report.answer import (
     best_rule,
+    budget_rows,
     details,
     names_in_order,
     percent,
     verdict,
 )
-from agents.report.budget_words import budget_rows
+from agents.report.choice_charts import choice_map
+from agents.report.drive_charts import OFF_COLOR, rows_told, timeline
 from agents.report.results import (
+    CHOICES,
     FRAMES,
+    GRAY_GAMMA,
+    OPTIMUM,
     RESULTS,
     TIMELINE,
-    TODAY,
     Strip,
     label,
     read_json,
     read_strip,
 )
+from agents.report.template import CANNOT_SHOW, page_of
 from unwrap.pictures import CYCLIC, ERROR, GRAY, VIRIDIS, ColorMap, picture
 from unwrap.signal import GRAY_FULL_SCALE
 from unwrap.support import write_text
 
 REPORT = "report.html"
 LARGEST_ERROR_M = 1.0  # assumed: a wrong wrap is six times that, a right one a tenth
-GRAY_GAMMA = 0.5  # assumed: a linear image is too dark to look at
 
 
 def write_report(folder: Path) -> Path:
@@ -48,11 +50,11 @@ def write_report(folder: Path) -> Path:
     ValueError
         A file of the results is missing or damaged; the message names it.
     """
-    results, played = read_json(folder / RESULTS), read_json(folder / TIMELINE)
+    results, played, choices = (read_json(folder / name) for name in (RESULTS, TIMELINE, CHOICES))
     strip = read_strip(folder / FRAMES) if results.get("every", 1) == 1 else None
     try:
-        page = render_page(results, played, strip)
-    except (KeyError, IndexError, TypeError, jinja2.UndefinedError) as error:
+        page = render_page(results, played, choices, strip)
+    except CANNOT_SHOW as error:
         raise ValueError(
             f"{folder} holds results that this version cannot show ({error!r}); "
             "`shotenv evaluate` writes them anew"
@@ -61,18 +63,16 @@ def write_report(folder: Path) -> Path:
     return folder / REPORT
 
 
-def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip | None) -> str:
+def render_page(
+    results: dict[str, Any], played: dict[str, Any], choices: dict[str, Any], strip: Strip | None
+) -> str:
     """The page as text; without frames where there is no strip of them."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,  # by default a misspelt name would print nothing
-    )
     panels = panels_of(strip, results["config"]["env"]["sensor"]["f1_hz"]) if strip else {}
     scheduler = results["scheduler"]
     # The best rule is what the scheduler has to be better than to be worth its training.
     compared = tuple(name for name in (scheduler, best_rule(results)) if name)
-    return environment.get_template("report.html.jinja").render(
+    return page_of(
+        "report.html.jinja",
         results=results,
         verdict=verdict(results),
         details=details(results),
@@ -84,17 +84,23 @@ def render_page(results: dict[str, Any], played: dict[str, Any], strip: Strip | 
         rows=_rows(results),
         cards=_cards(results),
         panels=[{"key": key, "title": panel.title, **panel.scale} for key, panel in panels.items()],
-        frames=json.dumps(_frames(strip, panels)) if strip else None,
+        frames=json.dumps(_frames(strip, panels, played["trip_k"])) if strip else None,
         families=list(dict.fromkeys(strip.family.tolist())) if strip else [],
         fronts=charts.figure_html(charts.fronts(results)),
         shares=charts.figure_html(charts.shares_by_family(results, compared)),
-        timeline=charts.figure_html(charts.timeline(played, scheduler, TODAY)),
+        choice_maps=[charts.figure_html(choice_map(one)) for one in choices["maps"]],
+        timeline=charts.figure_html(timeline(played, scheduler), "timeline"),
         drive=played["drive"],
+        drive_price=played["power_price"],
+        drive_families=json.dumps(played["family"]),
+        drive_rows=json.dumps(rows_told(played, scheduler)),
+        frame_rate_hz=played["frame_rate_hz"],
+        optimum_known=OPTIMUM in played["policies"],
         split=results["config"]["study"]["split"],
         price=_price(results),
         still_m=STILL_M,
         shot_colors={str(shots): color for shots, color in charts.SHOT_COLORS.items()},
-        plotly=get_plotlyjs(),  # all 4 MB of it: the page is read without a network
+        off_color=OFF_COLOR,
     )
 
 
@@ -236,8 +242,9 @@ def scored_m(strip: Strip, i: int) -> np.ndarray:
     return np.where(strip.truth_m[i] <= strip.max_range_m, strip.truth_m[i], np.nan)
 
 
-def _frames(strip: Strip, panels: dict[str, Panel]) -> list[dict[str, Any]]:
+def _frames(strip: Strip, panels: dict[str, Panel], trip_k: float) -> list[dict[str, Any]]:
     """Pictures and caption of every frame of the strip."""
+    known = len(strip.optimum_shots) > 0
     return [
         {
             "family": str(strip.family[i]),
@@ -246,6 +253,15 @@ def _frames(strip: Strip, panels: dict[str, Panel]) -> list[dict[str, Any]]:
             "shots": int(strip.shots[i]),
             "mae": None if np.isnan(strip.depth_mae_m[i]) else float(strip.depth_mae_m[i]),
             "valid": float(strip.valid[i].mean()),
+            "celsius": float(strip.temperature_k[i] - 273.15),
+            "margin": float(trip_k - strip.temperature_k[i]),
+            "energy": float(strip.laser_energy_j[i]),
+            "best": {
+                "shots": int(strip.optimum_shots[i]),
+                "energy": float(strip.optimum_energy_j[i]),
+            }
+            if known
+            else None,
             "images": {
                 key: picture(panel.values(strip, i), panel.colors) for key, panel in panels.items()
             },

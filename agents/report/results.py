@@ -2,7 +2,8 @@
 
 results.json    means and intervals of every policy, paired differences, seeds, versions
 drives.csv      one row per policy and drive
-timeline.json   one drive, frame by frame, of the scheduler and of always 8 DCS
+choices.json    what the scheduler asked for, over pairs of what it observed
+timeline.json   one drive, frame by frame, of the scheduler, of always 8 DCS and of the optimum
 frames.npz      images of some of its frames: gray, wrapped map, corrected depth, truth; none of a
                 thinned bank, which has no images
 """
@@ -24,7 +25,11 @@ from unwrap.support import write_bytes, write_text
 CURE = "`shotenv evaluate` writes it"
 TODAY = "always_8"
 """What a sensor without a scheduler does, and the answer compares with."""
-RESULTS, DRIVES, TIMELINE, FRAMES = "results.json", "drives.csv", "timeline.json", "frames.npz"
+OPTIMUM = "optimum"
+"""Dynamic programming, which knows what every choice would bring."""
+RESULTS, DRIVES, CHOICES = "results.json", "drives.csv", "choices.json"
+TIMELINE, FRAMES = "timeline.json", "frames.npz"
+GRAY_GAMMA = 0.5  # assumed: a linear image is too dark to look at
 # Policies without a line here are shown by their names, without underscores.
 LABELS = {
     "snr_threshold": "SNR threshold rule",
@@ -54,6 +59,11 @@ class Strip:
         Samples taken (0: the laser was off) and the frame's number in its drive.
     depth_mae_m : float64 [F]
         Mean absolute depth error, NaN where there is none.
+    temperature_k, laser_energy_j : float64 [F]
+        Of the laser after the frame, and its energy in the drive so far.
+    optimum_shots, optimum_energy_j : int64 [F], float64 [F]
+        Samples that the optimum takes of this frame and its energy so far; empty [0] where it is
+        not known.
     family, drive : str [F], int64 [F]
         Scene family and seed of the drive.
     unambiguous_m, max_range_m : float
@@ -68,6 +78,10 @@ class Strip:
     shots: np.ndarray
     frame: np.ndarray
     depth_mae_m: np.ndarray
+    temperature_k: np.ndarray
+    laser_energy_j: np.ndarray
+    optimum_shots: np.ndarray
+    optimum_energy_j: np.ndarray
     family: np.ndarray
     drive: np.ndarray
     unambiguous_m: np.ndarray

@@ -124,6 +124,7 @@ ONLY_IN = {
     "plotly": "agents/report/",
     "pygame": "shotenv/env/",
     "minari": "agents/evaluation/",
+    "rerun": "agents/report/",
     "jinja2": ("agents/report/", "unwrap/comparison/"),
     "PIL": ("unwrap/pictures/", "unwrap/recordings/", "unwrap/comparison/", "shotenv/"),
     "onnx": ("unwrap/export/", "agents/deploy/"),

@@ -132,7 +132,13 @@ def made_up_results(
             for name in NAMES
         },
         "config": {
-            "env": {"sensor": {"f1_hz": f1_hz}, "reward": {"power": [0.09, 0.09]}},
+            "env": {
+                "bank": "pocket",
+                "families": [],
+                "frames_per_drive": 256,
+                "sensor": {"f1_hz": f1_hz},
+                "reward": {"power": [0.09, 0.09]},
+            },
             "study": {"split": split},
         },
     }
@@ -150,10 +156,12 @@ def made_up_timeline(frames=256):
             "shots": np.where(off, 0, shots).tolist(),
             "depth_mae_m": [None if o else float(rng.random() * 0.4) for o in off],
             "temperature_k": (warm + warmer * 3).tolist(),
+            "laser_energy_j": (0.002 * np.where(off, 0, shots)).tolist(),
         }
 
     return {
         "drive": 1003,
+        "power_price": 0.09,
         "frame_rate_hz": 10.0,
         "trip_k": 330.0,
         "release_k": 325.0,
@@ -161,7 +169,24 @@ def made_up_timeline(frames=256):
         "policies": {
             "scheduler": played(rng.choice((2, 4, 8), frames), 0),
             "always_8": played(np.full(frames, 8), 1),
+            "optimum": played(np.resize((2, 8), frames), 0),
         },
+    }
+
+
+def made_up_choices():
+    counts = np.zeros((2, 3, 3), int)
+    counts[1, 0] = 6, 2, 2
+    counts[0, 2] = 0, 0, 40
+    signal = {"title": "signal-to-noise", "unit": "", "edges": [0.1, 0.2, 0.3, 0.4]}
+    distance = {"title": "mean predicted distance", "unit": "m", "edges": [4.0, 6.0, 8.0]}
+    margin = {"title": "below the laser's trip", "unit": "K", "edges": [32.0, 48.0, 64.0, None]}
+    price = {"title": "price of power", "unit": "", "marks": [0.01, 0.1]}
+    return {
+        "maps": [
+            {"x": signal, "y": distance, "counts": counts.tolist()},
+            {"x": margin, "y": price, "counts": counts.tolist()},
+        ]
     }
 
 
@@ -180,6 +205,10 @@ def made_up_strip(height=24, width=32):
         shots=np.resize((2, 4, 8, 0), count),
         frame=np.arange(count),
         depth_mae_m=np.where(np.resize((0, 0, 0, 1), count), np.nan, 0.1),
+        temperature_k=np.full(count, 320.0),
+        laser_energy_j=np.linspace(0.5, 1.5, count),
+        optimum_shots=np.full(count, 4),
+        optimum_energy_j=np.linspace(0.25, 0.75, count),
         family=np.repeat(FAMILIES, 2),
         drive=np.full(count, 1003),
         unambiguous_m=np.float64(6.2457),

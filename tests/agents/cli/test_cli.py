@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import pytest
 import torch
-from report_sample import made_up_results, made_up_strip, made_up_timeline
+from report_sample import made_up_choices, made_up_results, made_up_strip, made_up_timeline
 from safetensors.torch import load_file
 
 from agents.cli.doctor import Finding
 from agents.cli.entry import COMMANDS, main
 from agents.policies.learned import load_policy
-from agents.report.results import FRAMES, RESULTS, TIMELINE, write_strip
+from agents.report.results import CHOICES, FRAMES, RESULTS, TIMELINE, write_strip
 from agents.training.branching import Branches
 from agents.training.checkpoint import CHECKPOINT
 from shotenv.config.families import FAMILIES
@@ -197,10 +197,26 @@ def test_a_damaged_bank_is_told_from_a_good_one(capsys, tmp_path, tiny_bank):
 def test_report_is_written_anew(capsys, tmp_path):
     write_json(tmp_path / RESULTS, made_up_results())
     write_json(tmp_path / TIMELINE, made_up_timeline())
+    write_json(tmp_path / CHOICES, made_up_choices())
     write_strip(tmp_path / FRAMES, made_up_strip())
     status, out, _ = run(capsys, "report", tmp_path)
     assert status == 0 and out.strip() == str(tmp_path / "report.html")
     assert (tmp_path / "report.html").stat().st_size > 10**6
+
+
+def test_reports_of_several_evaluations_are_compared(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, f1_hz in (("wide", 10e6), ("fine", 24e6)):
+        write_json(tmp_path / name / RESULTS, made_up_results(f1_hz=f1_hz))
+    status, out, _ = run(capsys, "report", "wide", "fine")
+    assert status == 0 and out == "runs/comparison.html\n"
+    status, out, _ = run(capsys, "report", "wide", "fine", "--out", "both.html")
+    assert status == 0 and out == "both.html\n"
+    assert "2 evaluations: wide, fine" in (tmp_path / "both.html").read_text()
+    status, _, err = run(capsys, "report", "wide", "--out", "both.html")
+    assert status == 2 and "out is both.html; expected with several folders alone" in err
+    status, _, err = run(capsys, "report", "wide", "wide/")
+    assert status == 1 and "results has wide twice" in err
 
 
 def test_demo_does_the_main_job(capsys, tmp_path, tiny):

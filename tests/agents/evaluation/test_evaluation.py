@@ -10,7 +10,13 @@ from agents.config.demo import DemoConfig
 from agents.config.study_config import StudyConfig
 from agents.evaluation.acceptance import judged
 from agents.evaluation.headroom import measure_problem
-from agents.evaluation.play import FIXED_POLICIES, PlayedDrives, make_envs, play_drives
+from agents.evaluation.play import (
+    FIXED_POLICIES,
+    PlayedDrives,
+    make_envs,
+    play_drives,
+    play_optimum,
+)
 from agents.evaluation.price_sweep import MIXTURES
 from agents.evaluation.study import (
     check_study,
@@ -117,6 +123,31 @@ def test_the_hot_laser_trips_and_the_optimum_beats_every_fixed_choice(config, po
     assert best.sum() < 0.99 * min(one.cost.sum() for one in fixed)
 
 
+def test_the_optimum_played_is_that_of_the_table(config, possible):
+    problem = open_problem(config.env.model_copy(update={"split": "test"}))
+    best, frames = clairvoyant(possible.table()), []
+    played = play_optimum(problem, SEEDS, tick=frames.append)
+    np.testing.assert_array_equal(played.shots, np.array([2, 4, 8, 0])[best.actions])
+    returns = possible.table().returns(best.frame_cost)
+    np.testing.assert_allclose(played.per_drive["return"], returns, rtol=1e-9)
+    assert sum(frames) == played.shots.size
+
+
+def test_the_optimum_of_a_derated_laser_is_not_known(config):
+    derated = merged(config, {"env": {"split": "test", "laser": {"derate_per_k": 0.03}}})
+    assert play_optimum(open_problem(derated.env), SEEDS) is None
+
+
+def test_policies_are_remembered_with_what_they_saw_and_asked_for(config):
+    envs = make_envs(config.env, "test", len(SEEDS), "Disabled")
+    played = play_drives(FixedPolicy(8), envs, SEEDS)
+    assert (played.asked == 8).all() and (played.shots == 0).any()
+    first, _ = envs.reset(seed=SEEDS)
+    np.testing.assert_array_equal(played.observations[:, 0], first)
+    after, *_ = envs.step(np.full(len(SEEDS), 2))
+    np.testing.assert_array_equal(played.observations[:, 1], after)
+
+
 def test_a_drive_is_the_same_in_any_autoreset_mode(config):
     one, other = (
         play_drives(RandomPolicy(3), make_envs(config.env, "test", 3, mode), SEEDS)
@@ -142,6 +173,8 @@ def made_up_played(rewards):
     return PlayedDrives(
         seeds=np.arange(shape[0]),
         shots=np.full(shape, 4),
+        asked=np.full(shape, 4),
+        observations=np.zeros((*shape, len(FEATURE_NAMES)), np.float32),
         reward=np.asarray(rewards, float),
         laser_energy_j=ones,
         energy_j=2 * ones,
@@ -300,7 +333,8 @@ def test_train_and_evaluate_write_everything_the_report_needs(config, tmp_path):
     assert results["answer"]["measures"]["optimum"]["gap_closed"]["mean"] == pytest.approx(1.0)
     assert results["answer"]["measures"]["blind"]["gap_closed"]["mean"] == pytest.approx(0.0)
     assert {path.name for path in tmp_path.iterdir()} == {
-        *("agent", "results.json", "drives.csv", "timeline.json", "frames.npz", "report.html")
+        *("agent", "results.json", "drives.csv", "timeline.json", "choices.json", "frames.npz"),
+        "report.html",
     }
     assert json.loads((tmp_path / "results.json").read_text()) == evaluation.results
     for policy in results["policies"].values():

@@ -1,14 +1,22 @@
+import dataclasses
 import json
 import re
 
 import numpy as np
 import pytest
-from report_sample import RULES, made_up_results, made_up_strip, made_up_timeline
+from report_sample import (
+    RULES,
+    made_up_choices,
+    made_up_results,
+    made_up_strip,
+    made_up_timeline,
+)
 
 from agents.report.answer import details, verdict
 from agents.report.charts import prices_apart, undominated
 from agents.report.page import REPORT, render_page, write_report
 from agents.report.results import (
+    CHOICES,
     FRAMES,
     RESULTS,
     TIMELINE,
@@ -34,7 +42,7 @@ def decoded(uri):
 
 @pytest.fixture(scope="module")
 def page():
-    return render_page(made_up_results(), made_up_timeline(), made_up_strip())
+    return render_page(made_up_results(), made_up_timeline(), made_up_choices(), made_up_strip())
 
 
 def text_of_table(page, body):
@@ -48,6 +56,7 @@ def named_in(page, body):
 def write_sample(folder):
     write_json(folder / RESULTS, made_up_results())
     write_json(folder / TIMELINE, made_up_timeline())
+    write_json(folder / CHOICES, made_up_choices())
     write_strip(folder / FRAMES, made_up_strip())
 
 
@@ -102,7 +111,7 @@ def test_without_rules_and_optimum_the_rest_is_told():
     told = " ".join(details(results))
     assert "rules" not in told and "gap" not in told and "At half the laser energy" in told
     assert "Optimum" not in text_of_table(
-        render_page(results, made_up_timeline(), made_up_strip()), "fronts"
+        render_page(results, made_up_timeline(), made_up_choices(), made_up_strip()), "fronts"
     )
 
 
@@ -126,7 +135,7 @@ def test_page_is_self_contained(page):
     # The first script is plotly itself, the others the charts and the page's own.
     library, *calls = re.findall(r"<script[^>]*>(.*?)</script>", page, flags=re.DOTALL)
     assert len(library) > 10**6 and "plotly.js" in library[:200]
-    assert sum("Plotly.newPlot" in call for call in calls) == 3
+    assert sum("Plotly.newPlot" in call for call in calls) == 5
 
 
 def test_page_shows_every_policy_and_family(page):
@@ -162,10 +171,44 @@ def test_page_holds_five_pictures_of_each_frame(page):
         assert decoded(frame["images"]["truth"]).shape == (24, 32, 3)
 
 
+def rows_of_drive(page):
+    return json.loads(re.search(r"const drive = .*?, rows: (\[.*?\]) };\n", page).group(1))
+
+
+def test_the_drive_tells_every_policy_frame_by_frame(page):
+    record, rows = made_up_timeline(), rows_of_drive(page)
+    assert [row["label"] for row in rows] == ["Scheduler", "Optimum", "Always 8 DCS"]
+    played = record["policies"]["always_8"]
+    assert rows[2]["shots"] == played["shots"] and rows[2]["mae"][200] is None
+    assert rows[2]["energy"][-1] == pytest.approx(0.002 * 8 * 236)  # 20 frames without laser
+    temperature_k = np.array(played["temperature_k"])
+    np.testing.assert_allclose(rows[2]["margin"], record["trip_k"] - temperature_k, atol=0.01)
+    np.testing.assert_allclose(rows[2]["celsius"], temperature_k - 273.15, atol=0.01)
+
+
+def test_frames_tell_heat_energy_and_the_optimum(page):
+    frames = json.loads(re.search(r"const frames = (\[.*?\]);\n", page).group(1))
+    assert frames[0]["energy"] == 0.5 and frames[-1]["energy"] == 1.5
+    assert frames[0]["margin"] == pytest.approx(10.0) and frames[0]["best"]["shots"] == 4
+    assert frames[-1]["best"]["energy"] == 0.75
+
+
+def test_an_optimum_that_is_not_known_is_said_to_be_missing():
+    record, strip = made_up_timeline(), made_up_strip()
+    del record["policies"]["optimum"]
+    nothing = np.empty(0)
+    strip = dataclasses.replace(strip, optimum_shots=nothing, optimum_energy_j=nothing)
+    page = render_page(made_up_results(), record, made_up_choices(), strip)
+    assert "What the optimum would have done is not known" in page
+    assert [row["label"] for row in rows_of_drive(page)] == ["Scheduler", "Always 8 DCS"]
+    frames = json.loads(re.search(r"const frames = (\[.*?\]);\n", page).group(1))
+    assert {frame["best"] for frame in frames} == {None}
+
+
 def test_texts_follow_the_configuration():
-    page = render_page(made_up_results(), made_up_timeline(), made_up_strip())
+    page = render_page(made_up_results(), made_up_timeline(), made_up_choices(), made_up_strip())
     other = made_up_results(f1_hz=10e6, split="shift")
-    changed = render_page(other, made_up_timeline(), made_up_strip())
+    changed = render_page(other, made_up_timeline(), made_up_choices(), made_up_strip())
     assert "<figcaption>Wrapped map, 24 MHz</figcaption>" in page
     assert "<figcaption>Wrapped map, 10 MHz</figcaption>" in changed and "24 MHz" not in changed
     assert "over 24 test drives" in page and "the same 24 drives of the test split" in page
@@ -176,7 +219,7 @@ def test_names_are_escaped():
     results = made_up_results()
     results["policies"]["<script>x"] = results["policies"]["random"]
     results["paired_to_best_fixed"]["<script>x"] = results["paired_to_best_fixed"]["random"]
-    table = render_page(results, made_up_timeline(), made_up_strip())
+    table = render_page(results, made_up_timeline(), made_up_choices(), made_up_strip())
     assert "<rule>" not in table
     assert "<td><script>x" not in table and "&lt;script&gt;x" in table
 
@@ -196,7 +239,7 @@ def test_strip_survives_the_disk(tmp_path):
         np.testing.assert_array_equal(value, getattr(strip, name))
 
 
-@pytest.mark.parametrize("name", [RESULTS, TIMELINE, FRAMES])
+@pytest.mark.parametrize("name", [RESULTS, TIMELINE, CHOICES, FRAMES])
 @pytest.mark.parametrize("damage", ["missing", "cut off", "other"])
 def test_damaged_results_are_named_and_the_old_page_stays(tmp_path, name, damage):
     write_sample(tmp_path)
@@ -229,6 +272,7 @@ def test_the_page_of_a_thinned_bank_says_why_it_shows_no_frames(tmp_path):
     results["config"]["env"]["bank"] = "pocket"
     write_json(tmp_path / RESULTS, results)
     write_json(tmp_path / TIMELINE, made_up_timeline())
+    write_json(tmp_path / CHOICES, made_up_choices())
     page = write_report(tmp_path).read_text()
     assert "Bank pocket holds every 8th pixel and no images" in page
     assert 'id="frames"' not in page and "const frames" not in page
