@@ -125,6 +125,24 @@ def test_every_learner_trains_by_the_same_command(capsys, tmp_path, tiny, algori
     assert chose != others and len(rescored["prices"]) == 4
 
 
+def test_a_training_that_is_at_its_end_is_not_begun_again(capsys, tmp_path, tiny, monkeypatch):
+    small = f"{SHORT['regression']} --env.frames_per_drive 16".split()
+    file = configs_dir() / "agent" / "regression.yaml"
+    words = ("train", "--agent", file, *small, *tiny, "--out", tmp_path)
+    assert run(capsys, *words)[0] == 0
+    monkeypatch.setattr(
+        "agents.training.scheduler.branches_of", lambda *_: pytest.fail("measured anew")
+    )
+    assert run(capsys, *words)[0] == 0
+    monkeypatch.undo()
+    # Another configuration is another run, which must not take this one's place.
+    status, _, err = run(capsys, *words, "--agent.seed", "5")
+    assert status == 1 and "another configuration" in err
+    # What was cut off before its end goes on.
+    (tmp_path / "validation.json").unlink()
+    assert run(capsys, *words)[0] == 0 and (tmp_path / "validation.json").is_file()
+
+
 def test_a_group_lists_its_commands(capsys):
     status, out, _ = run(capsys, "bank", "--help")
     assert status == 0 and "bank info" in out and "doctor" not in out
