@@ -197,7 +197,7 @@ def wrong_wrap_bounds(frequencies, distance_m, max_range_m, noise_rad):
 
     Of equal noise the true point and another candidate are told apart by half of their distance
     across the line of true distances: Q(D / 2 sigma). The likeliest error is a lower, the sum over
-    all an upper bound.
+    all an upper bound (union bound).
     """
     direction = np.array(frequencies) / math.hypot(*frequencies)
     singles = {}
@@ -211,11 +211,17 @@ def wrong_wrap_bounds(frequencies, distance_m, max_range_m, noise_rad):
 
 
 @pytest.mark.parametrize(
-    ("frequencies", "max_range_m", "noise_rad"),
-    [((F1, F2), 25.0, 0.5), ((80e6, 16e6), 9.0, 0.25), (KINECT_HZ, 18.0, 0.42)],
+    ("frequencies", "distance_m", "max_range_m", "noise_rad"),
+    [
+        ((F1, F2), 10.0, 25.0, 0.5),
+        ((80e6, 16e6), 4.6, 9.0, 0.25),
+        (KINECT_HZ, 9.1, 18.0, 0.42),
+    ],
 )
-def test_wrong_wraps_in_noise_are_as_many_as_the_lattice_says(frequencies, max_range_m, noise_rad):
-    distance_m = max_range_m / 2 + 0.1
+def test_wrong_wraps_in_noise_are_as_many_as_the_lattice_says(
+    frequencies, distance_m, max_range_m, noise_rad
+):
+    # No candidate lies so near to an end of the range that noise decides whether it counts.
     truth = torch.full((100_000,), distance_m, dtype=torch.float64)
     phases = phases_of(truth, frequencies, noise_rad=noise_rad, seed=3)
     found, _ = unwrap_frequencies(phases, frequencies, max_range_m=max_range_m)
