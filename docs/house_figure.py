@@ -93,10 +93,10 @@ PLACES = {
     "unwrap.depth": Box(612, 794, *MAIN),
     "unwrap.training": Box(802, 970, *MAIN),
     "unwrap.ros": Box(30, 178, *CELLAR),
-    "unwrap.comparison": Box(186, 352, *CELLAR),
-    "unwrap.export": Box(360, 536, *CELLAR),
-    "unwrap.pictures": Box(544, 700, *CELLAR),
-    "unwrap.support": Box(708, 970, *CELLAR),
+    "unwrap.comparison": Box(186, 376, *CELLAR),
+    "unwrap.export": Box(384, 556, *CELLAR),
+    "unwrap.pictures": Box(564, 714, *CELLAR),
+    "unwrap.support": Box(722, 970, *CELLAR),
 }
 """Where each room is drawn. Rooms on the frame's way touch the hallway of their floor."""
 

@@ -7,8 +7,8 @@ gradients, which is the reference, and a compiled loop, which processors use.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -98,12 +98,13 @@ def hypotheses(
     if not can_loop(*(part for one in frames for part in (one.phase_rad, one.amplitude))):
         return hypotheses_by_torch(frames, noise, model, kept)
     batch, height, width = frames[0].phase_rad.shape
+    constants: Iterable[Any] = model  # Numbers, and tuples, which become arrays.
     depth_m, cost = torch.empty(2, batch, kept, height, width).unbind()
     rank_candidates(
         torch.stack([one.phase_rad for one in frames]).numpy(),
         torch.stack([one.amplitude for one in frames]).numpy(),
         array_of(noise, frames[0].phase_rad.shape),
-        MismatchModel._make(map(np.float32, model)),
+        MismatchModel._make(map(np.float32, constants)),
         model.wraps,
         depth_m.numpy(),
         cost.numpy(),

@@ -1,4 +1,4 @@
-"""Files of ROS 2: depth images and point clouds as messages in MCAP, without ROS."""
+"""Depth as messages of ROS 2, in MCAP files."""
 
 import lazy_loader
 
