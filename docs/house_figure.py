@@ -94,9 +94,9 @@ PLACES = {
     "unwrap.training": Box(802, 970, *MAIN),
     "unwrap.ros": Box(30, 178, *CELLAR),
     "unwrap.comparison": Box(186, 376, *CELLAR),
-    "unwrap.export": Box(384, 556, *CELLAR),
-    "unwrap.pictures": Box(564, 714, *CELLAR),
-    "unwrap.support": Box(722, 970, *CELLAR),
+    "unwrap.export": Box(384, 568, *CELLAR),
+    "unwrap.pictures": Box(576, 722, *CELLAR),
+    "unwrap.support": Box(730, 970, *CELLAR),
 }
 """Where each room is drawn. Rooms on the frame's way touch the hallway of their floor."""
 
