@@ -95,8 +95,8 @@ PLACES = {
     "unwrap.ros": Box(30, 178, *CELLAR),
     "unwrap.comparison": Box(186, 376, *CELLAR),
     "unwrap.export": Box(384, 568, *CELLAR),
-    "unwrap.pictures": Box(576, 722, *CELLAR),
-    "unwrap.support": Box(730, 970, *CELLAR),
+    "unwrap.pictures": Box(576, 702, *CELLAR),
+    "unwrap.support": Box(710, 970, *CELLAR),
 }
 """Where each room is drawn. Rooms on the frame's way touch the hallway of their floor."""
 
