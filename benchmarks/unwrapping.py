@@ -38,10 +38,9 @@ def measured() -> dict:
     dcs_lsb = (20 * torch.randn(1, 8, HEIGHT, WIDTH, generator=random)).round()
     raw = RawFrame(dcs_lsb, torch.zeros(1, HEIGHT, WIDTH, dtype=torch.bool))
     sensor, parameters = SensorDescription(noise_lsb=20.0), KernelDensity()
-    first, second = (decode_at(i, raw, sensor) for i in (0, 1))
-    depth_m, weight = hypotheses(
-        first, second, sensor, 20.0, parameters.mismatch_model(sensor), parameters.hypotheses
-    )
+    frames = [decode_at(i, raw, sensor) for i in (0, 1)]
+    model = parameters.mismatch_model((sensor.f1_hz, sensor.f2_hz), sensor.max_range_m)
+    depth_m, weight = hypotheses(frames, 20.0, model, parameters.hypotheses)
 
     def vote() -> None:
         kernel_density(depth_m, weight, parameters)

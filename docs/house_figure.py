@@ -92,10 +92,11 @@ PLACES = {
     "unwrap.networks.peers": Box(384, 594, 168, 194),
     "unwrap.depth": Box(612, 794, *MAIN),
     "unwrap.training": Box(802, 970, *MAIN),
-    "unwrap.comparison": Box(30, 210, *CELLAR),
-    "unwrap.export": Box(218, 440, *CELLAR),
-    "unwrap.pictures": Box(448, 640, *CELLAR),
-    "unwrap.support": Box(648, 970, *CELLAR),
+    "unwrap.ros": Box(30, 178, *CELLAR),
+    "unwrap.comparison": Box(186, 376, *CELLAR),
+    "unwrap.export": Box(384, 568, *CELLAR),
+    "unwrap.pictures": Box(576, 702, *CELLAR),
+    "unwrap.support": Box(710, 970, *CELLAR),
 }
 """Where each room is drawn. Rooms on the frame's way touch the hallway of their floor."""
 

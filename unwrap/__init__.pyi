@@ -5,6 +5,7 @@ from .depth import (
     merge_regression as merge_regression,
     merge_segmentation as merge_segmentation,
     unwrap_dual as unwrap_dual,
+    unwrap_frequencies as unwrap_frequencies,
 )
 from .networks import (
     Prediction as Prediction,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any, get_args
 
@@ -109,8 +110,30 @@ def correct_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--wiggle", type=Path, metavar="FILE", help="the sensor's own wiggle table")
     parser.add_argument("--noise-lsb", type=float, metavar="X", help="std of a sample, LSB")
     parser.add_argument("--fov-deg", type=float, default=60.0, help="horizontal field of view")
-    parser.add_argument("--overwrite", action="store_true", help="replace files that stand in DIR")
+    add_depth_files(parser)
     add_json(parser)
+
+
+def add_depth_files(parser: ArgumentParser) -> None:
+    """Which files the depth is written as, beside those that are always written."""
+    from unwrap.recordings import Points
+
+    forms = ", ".join(get_args(Points))
+    parser.add_argument("--points", type=Points, default="ply", help=f"format of points: {forms}")
+    parser.add_argument(
+        "--mcap", type=Path, metavar="FILE", help="all frames as messages of ROS 2, too"
+    )
+    parser.add_argument("--frame-rate-hz", type=float, default=10.0, help="of the times in --mcap")
+    parser.add_argument("--overwrite", action="store_true", help="replace files that stand in DIR")
+
+
+def depth_log(arguments: Namespace) -> AbstractContextManager[Any]:
+    """The file that `--mcap` names, open; or None."""
+    from unwrap.ros import mcap_log
+
+    if arguments.mcap is None:
+        return nullcontext()
+    return mcap_log(arguments.mcap, arguments.frame_rate_hz)
 
 
 def correct_files(arguments: Namespace) -> int:
@@ -140,10 +163,12 @@ def correct_files(arguments: Namespace) -> int:
         arguments.input, bits=camera.bits, gray=arguments.gray, offset=arguments.offset
     )
     if not arguments.overwrite:
-        refuse_overwriting(recording, arguments.out)
+        refuse_overwriting(recording, arguments.out, points=arguments.points, mcap=arguments.mcap)
     frames = correct_recording(recording, camera)
-    with progress(len(frames), "writing", "frame") as bar:
-        found = write_frames(frames, camera, arguments.out, tick=bar.update)
+    with depth_log(arguments) as log, progress(len(frames), "writing", "frame") as bar:
+        found = write_frames(
+            frames, camera, arguments.out, points=arguments.points, log=log, tick=bar.update
+        )
     for frame in found["frames"]:
         told = f"{100 * frame['valid_share']:.1f} % valid, median {frame['median_m']:.3f} m"
         if frame["pixels_beyond_png"]:

@@ -32,7 +32,8 @@ room("unwrap.depth", *SIGNAL)
 room("unwrap.networks", *SIGNAL, "unwrap.depth")
 room("unwrap.networks.peers", *UNWRAPPING)
 room("unwrap.training", *UNWRAPPING)
-room("unwrap.recordings", *UNWRAPPING, "unwrap.pictures")
+room("unwrap.ros", "unwrap.support")
+room("unwrap.recordings", *UNWRAPPING, "unwrap.pictures", "unwrap.ros")
 room("unwrap.export", *UNWRAPPING, "unwrap.training")
 room("unwrap.comparison", *UNWRAPPING, "unwrap.training", "unwrap.pictures")
 room("unwrap", *UNWRAPPING)
@@ -123,6 +124,7 @@ ONLY_IN = {
     "numba": "unwrap/support/compiled.py",
     "plotly": "agents/report/",
     "pygame": "shotenv/env/",
+    "mcap": "unwrap/ros/",
     "minari": "agents/evaluation/",
     "rerun": "agents/report/",
     "jinja2": ("agents/report/", "unwrap/comparison/"),

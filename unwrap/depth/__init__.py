@@ -1,4 +1,4 @@
-"""Phase to distance: two frequencies, merge rules, correction, classical methods, metrics."""
+"""Phase to distance: one to three frequencies, merging, correction, classical methods, metrics."""
 
 import lazy_loader
 

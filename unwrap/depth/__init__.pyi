@@ -11,13 +11,10 @@ from .correction import (
     shift_in_turns as shift_in_turns,
     turns_table as turns_table,
 )
-from .dual import (
-    DualLimits as DualLimits,
-    dual_limits as dual_limits,
-    fuse_pixels as fuse_pixels,
-    unwrap_dual as unwrap_dual,
+from .kernel_density import (
+    unwrap_kernel_density as unwrap_kernel_density,
+    vote_frequencies as vote_frequencies,
 )
-from .kernel_density import unwrap_kernel_density as unwrap_kernel_density
 from .merge import (
     RULES as RULES,
     Limits as Limits,
@@ -29,6 +26,13 @@ from .merge import (
     nearest_wraps as nearest_wraps,
 )
 from .metrics import depth_metrics as depth_metrics
+from .multi_frequency import (
+    DualLimits as DualLimits,
+    dual_limits as dual_limits,
+    fuse_pixels as fuse_pixels,
+    unwrap_dual as unwrap_dual,
+    unwrap_frequencies as unwrap_frequencies,
+)
 from .reflectance import ReflectancePrior as ReflectancePrior, calibrate as calibrate
 from .scoring import (
     Scores as Scores,

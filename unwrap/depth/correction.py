@@ -13,9 +13,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from unwrap.depth.dual import dual_limits, fuse_pixels, unwrap_dual
 from unwrap.depth.kernel_density import unwrap_kernel_density
 from unwrap.depth.merge import RULES, Limits, Merge, merge_pixels
+from unwrap.depth.multi_frequency import dual_limits, fuse_pixels, unwrap_dual
 from unwrap.signal import (
     FLAT,
     DepthFrame,

@@ -1,11 +1,11 @@
-"""Two-frequency unwrapping by a spatial kernel density, after Jaremo Lawin et al. (2016).
+"""Unwrapping by the density of neighbours' hypotheses, after Jaremo Lawin et al. (2016).
 
 F. Jaremo Lawin, P.-E. Forssen, H. Ovren, Efficient Multi-Frequency Phase Unwrapping using Kernel
 Density Estimation, ECCV 2016; the method behind libfreenect2's unwrapping of the Kinect v2. A pixel
 alone often cannot tell which wrap hypothesis is right; its neighbours vote, each with a kernel
-around the distances that it thinks likely. Adapted: two frequencies instead of three, and the
-mismatch of phases is counted in its own standard deviations as the sensor's noise predicts them,
-instead of the fixed weights and the fitted noise curves of one camera.
+around the distances that it thinks likely. Adapted: one to three frequencies, and the mismatch of
+phases is counted in its own standard deviations as the sensor's noise predicts them, instead of the
+fixed weights and the fitted noise curves of one camera.
 
 Everything stands twice, and tests hold both together: chains of torch operations, for any device
 and for gradients, which are the reference, and compiled loops, which processors use.
@@ -14,6 +14,7 @@ and for gradients, which are the reference, and compiled loops, which processors
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,12 +30,8 @@ from unwrap.depth.candidates import (
     require_shots,
 )
 from unwrap.depth.mismatch import MismatchModel, hypotheses
-from unwrap.signal import (
-    RawFrame,
-    SensorDescription,
-    Shots,
-    decode_at,
-)
+from unwrap.depth.multi_frequency import check_phases
+from unwrap.signal import PhaseFrame, RawFrame, SensorDescription, Shots, decode_at
 from unwrap.support import array, can_loop
 
 Array = np.ndarray
@@ -92,10 +89,11 @@ class KernelDensity:
             if not getattr(self, name) >= least:  # False for NaN, too.
                 raise ValueError(f"{name} is {getattr(self, name)}; expected at least {least}")
 
-    def mismatch_model(self, sensor: SensorDescription) -> MismatchModel:
+    def mismatch_model(self, frequencies_hz: Sequence[float], max_range_m: float) -> MismatchModel:
         """By which the hypotheses of a pixel are weighed."""
         return MismatchModel.of(
-            sensor,
+            frequencies_hz,
+            max_range_m,
             systematic_m=self.systematic_m,
             mismatch_scale=self.mismatch_scale,
             phase_scale_rad2=self.phase_scale_rad2,
@@ -144,21 +142,65 @@ def unwrap_kernel_density(
     require_shots(raw, (Shots.EIGHT,))
     parameters = parameters or KernelDensity()
     noise = sensor.noise_lsb if noise_lsb is None else noise_lsb
-    first, second = (
-        decode_at(i, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m) for i in (0, 1)
+    frames = [decode_at(i, raw, sensor, offset_lsb=offset_lsb, shift_m=shift_m) for i in (0, 1)]
+    depth_m, confidence = vote_frequencies(
+        frames,
+        (sensor.f1_hz, sensor.f2_hz),
+        noise,
+        max_range_m=sensor.max_range_m,
+        parameters=parameters,
     )
-    model = parameters.mismatch_model(sensor)
-    depth_m, weight = hypotheses(first, second, sensor, noise, model, parameters.hypotheses)
-    confidence, winner = kernel_density(depth_m, weight, parameters).max(1)
     return depth_with_confidence(
-        chosen(depth_m, winner),
+        depth_m,
         confidence,
-        first,
+        frames[0],
         raw,
         sensor,
         noise_lsb=noise,
         min_confidence=parameters.min_confidence,
     )
+
+
+def vote_frequencies(
+    frames: Sequence[PhaseFrame],
+    frequencies_hz: Sequence[float],
+    noise_lsb: Tensor | float,
+    *,
+    max_range_m: float,
+    parameters: KernelDensity | None = None,
+) -> tuple[Tensor, Tensor]:
+    """Distance by the neighbours' vote over the phases of one, two or three frequencies.
+
+    One frequency has one hypothesis, its wrapped distance; the vote then tells how many neighbours
+    share it.
+
+    Parameters
+    ----------
+    frames : K of PhaseFrame [B, H, W]
+        Of four samples each.
+    frequencies_hz : K floats
+        The highest first, as in `unwrap_frequencies`.
+    noise_lsb : float or float [B, H, W]
+        Standard deviation of one sample.
+    max_range_m : float
+        Largest distance considered, metres.
+
+    Returns
+    -------
+    distance_m, confidence : float [B, H, W]
+        Fused distance of the winner, metres, and its share of the neighbours' weight, 0..1.
+
+    Raises
+    ------
+    ValueError
+        Another number of frequencies, unequal shapes, or a frequency or range that is not positive.
+    """
+    check_phases([one.phase_rad for one in frames], frequencies_hz, max_range_m)
+    parameters = parameters or KernelDensity()
+    model = parameters.mismatch_model(frequencies_hz, max_range_m)
+    depth_m, weight = hypotheses(frames, noise_lsb, model, parameters.hypotheses)
+    confidence, winner = kernel_density(depth_m, weight, parameters).max(1)
+    return chosen(depth_m, winner), confidence
 
 
 def kernel_density(depth_m: Tensor, weight: Tensor, parameters: KernelDensity) -> Tensor:

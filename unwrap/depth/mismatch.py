@@ -1,4 +1,4 @@
-"""Wrap hypotheses of two frequencies, weighed by the mismatch of their phases.
+"""Wrap hypotheses of one to three frequencies, weighed by the mismatch of their phases.
 
 Twice, and a test holds both together: a chain of torch operations, for any device and for
 gradients, which is the reference, and a compiled loop, which processors use.
@@ -7,21 +7,16 @@ gradients, which is the reference, and a compiled loop, which processors use.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from unwrap.depth.candidates import candidates_m
-from unwrap.signal import (
-    TWO_PI,
-    PhaseFrame,
-    SensorDescription,
-    distance_m,
-    unambiguous_range_m,
-)
-from unwrap.support import array, array_of, can_loop, loop
+from unwrap.depth.multi_frequency import fusing_shares
+from unwrap.signal import TWO_PI, PhaseFrame, unambiguous_range_m
+from unwrap.support import array_of, can_loop, loop
 
 Array = np.ndarray
 # float32, since a Python float would make the arithmetic of a loop float64.
@@ -31,174 +26,188 @@ LEAST_AMPLITUDE = np.float32(1e-6)
 
 
 class MismatchModel(NamedTuple):
-    """Constants of `hypotheses`, float32 for loops.
+    """Constants of `hypotheses`; in loops float32, and float32 [K] where there is one of each.
 
     Attributes
     ----------
-    range1_m, range2_m
+    ranges_m : K floats
         Unambiguous ranges.
+    m_per_rad : K floats
+        Distances of a phase.
+    shares : K floats
+        Of each frequency as it is fused with those before it, see `fusing_shares`.
     farthest_m
         Candidates beyond it have no weight.
-    m_per_rad1, m_per_rad2
-        Distance of a phase.
     systematic_m2
         Variance of the mismatch that noise does not explain.
     mismatch_scale, phase_scale_rad2
         See `unwrap.depth.kernel_density.KernelDensity`.
-    share2
-        Of f2 in the fused distance: by inverse variance, which goes with f^2, as in `unwrap_dual`.
     """
 
-    range1_m: float
-    range2_m: float
+    ranges_m: tuple[float, ...]
+    m_per_rad: tuple[float, ...]
+    shares: tuple[float, ...]
     farthest_m: float
-    m_per_rad1: float
-    m_per_rad2: float
     systematic_m2: float
     mismatch_scale: float
     phase_scale_rad2: float
-    share2: float
 
     @classmethod
     def of(
         cls,
-        sensor: SensorDescription,
+        frequencies_hz: Sequence[float],
+        max_range_m: float,
         *,
         systematic_m: float,
         mismatch_scale: float,
         phase_scale_rad2: float,
     ) -> MismatchModel:
-        """For a sensor's frequencies."""
-        range1_m, range2_m = (unambiguous_range_m(hz) for hz in (sensor.f1_hz, sensor.f2_hz))
+        """For one to three frequencies."""
+        ranges_m = tuple(map(unambiguous_range_m, frequencies_hz))
         return cls(
-            range1_m,
-            range2_m,
-            sensor.max_range_m,
-            range1_m / TWO_PI,
-            range2_m / TWO_PI,
+            ranges_m,
+            tuple(range_m / TWO_PI for range_m in ranges_m),
+            fusing_shares(frequencies_hz),
+            max_range_m,
             systematic_m**2,
             mismatch_scale,
             phase_scale_rad2,
-            sensor.f2_hz**2 / (sensor.f1_hz**2 + sensor.f2_hz**2),
         )
+
+    @property
+    def wraps(self) -> int:
+        """Wrap candidates of a pixel: those that begin within the range, of one frequency one."""
+        # One phase has no mismatch: nothing would tell the wraps apart.
+        one = len(self.ranges_m) == 1
+        return 1 if one else math.floor(self.farthest_m / self.ranges_m[0]) + 1
 
 
 def hypotheses(
-    first: PhaseFrame,
-    second: PhaseFrame,
-    sensor: SensorDescription,
-    noise: Tensor | float,
-    model: MismatchModel,
-    most: int,
+    frames: Sequence[PhaseFrame], noise: Tensor | float, model: MismatchModel, most: int
 ) -> tuple[Tensor, Tensor]:
     """The `most` likeliest distances and their weights, both [B, I, H, W], likeliest first.
 
     Fewer than `most` where the range has fewer wraps.
+
+    Parameters
+    ----------
+    frames : K of PhaseFrame [B, H, W]
+        At the frequencies of `model`.
     """
-    count = math.floor(sensor.max_range_m / model.range1_m) + 1
-    kept = min(most, count)
-    maps = (first.phase_rad, second.phase_rad, first.amplitude, second.amplitude)
-    if not can_loop(*maps):
-        return hypotheses_by_torch(first, second, sensor, noise, model, kept)
-    batch, height, width = first.phase_rad.shape
+    kept = min(most, model.wraps)
+    if not can_loop(*(part for one in frames for part in (one.phase_rad, one.amplitude))):
+        return hypotheses_by_torch(frames, noise, model, kept)
+    batch, height, width = frames[0].phase_rad.shape
+    constants: Iterable[Any] = model  # Numbers, and tuples, which become arrays.
     depth_m, cost = torch.empty(2, batch, kept, height, width).unbind()
     rank_candidates(
-        array(first.phase_rad),
-        array(second.phase_rad),
-        array(first.amplitude),
-        array(second.amplitude),
-        array_of(noise, first.phase_rad.shape),
-        MismatchModel._make(map(np.float32, model)),
-        count,
-        array(depth_m),
-        array(cost),
+        torch.stack([one.phase_rad for one in frames]).numpy(),
+        torch.stack([one.amplitude for one in frames]).numpy(),
+        array_of(noise, frames[0].phase_rad.shape),
+        MismatchModel._make(map(np.float32, constants)),
+        model.wraps,
+        depth_m.numpy(),
+        cost.numpy(),
     )
     return depth_m, cost.mul_(-0.5).exp_()
 
 
 def hypotheses_by_torch(
-    first: PhaseFrame,
-    second: PhaseFrame,
-    sensor: SensorDescription,
-    noise: Tensor | float,
-    model: MismatchModel,
-    kept: int,
+    frames: Sequence[PhaseFrame], noise: Tensor | float, model: MismatchModel, kept: int
 ) -> tuple[Tensor, Tensor]:
     """Reference of `rank_candidates`, and what becomes of the costs."""
-    # Each candidate of f1 with its nearest one of f2: what rounding leaves is their mismatch.
-    first_m = candidates_m(first.phase_rad, sensor.f1_hz, sensor.max_range_m)
-    second_m = distance_m(second.phase_rad, sensor.f2_hz).unsqueeze(1)
-    gap = (first_m - second_m) / model.range2_m
-    mismatch_m = (gap - gap.round()) * model.range2_m
+    wraps = torch.arange(model.wraps, device=frames[0].phase_rad.device).view(-1, 1, 1)
+    first_m = (frames[0].phase_rad * model.m_per_rad[0]).unsqueeze(1) + wraps * model.ranges_m[0]
     # Four samples: the variance of the phase is (noise / A)^2 / 2.
-    variance1, variance2 = (
-        (noise / frame.amplitude.clamp(min=float(LEAST_AMPLITUDE))).square().unsqueeze(1) / 2
-        for frame in (first, second)
-    )
-    variance_m2 = model.m_per_rad1**2 * variance1 + model.m_per_rad2**2 * variance2
-    scale_m2 = model.mismatch_scale * (variance_m2 + model.systematic_m2)
-    unsure = (variance1 + variance2) / model.phase_scale_rad2
-    cost = mismatch_m.square() / scale_m2 + unsure
-    cost = cost.where(first_m <= model.farthest_m, torch.inf)
-    fused_m = (first_m - model.share2 * mismatch_m).clamp(min=0)
+    variances = [
+        (noise / one.amplitude.clamp(min=float(LEAST_AMPLITUDE))).square().unsqueeze(1) / 2
+        for one in frames
+    ]
+    fused_m, cost = first_m, torch.zeros_like(first_m)
+    fused_m2 = model.m_per_rad[0] ** 2 * variances[0]
+    for k in range(1, len(frames)):
+        # Each candidate with the nearest one of f_k: what rounding leaves is their mismatch.
+        own_m = (frames[k].phase_rad * model.m_per_rad[k]).unsqueeze(1)
+        gap = (fused_m - own_m) / model.ranges_m[k]
+        mismatch_m = (gap - gap.round()) * model.ranges_m[k]
+        own_m2, share = model.m_per_rad[k] ** 2 * variances[k], model.shares[k]
+        scale_m2 = model.mismatch_scale * (fused_m2 + own_m2 + model.systematic_m2)
+        cost = cost + mismatch_m.square() / scale_m2
+        fused_m = fused_m - share * mismatch_m
+        fused_m2 = (1 - share) ** 2 * fused_m2 + share**2 * own_m2
+    cost = cost + sum(variances) / model.phase_scale_rad2
+    if len(frames) > 1:
+        cost = cost.where(first_m <= model.farthest_m, torch.inf)
     # Sorted by cost, and not by weight, which is 0 for all that is unlikely.
     cost, order = cost.sort(dim=1, stable=True)
-    return fused_m.gather(1, order[:, :kept]), cost[:, :kept].mul(-0.5).exp()
+    return fused_m.clamp(min=0).gather(1, order[:, :kept]), cost[:, :kept].mul(-0.5).exp()
 
 
 @loop
 def rank_candidates(
-    phase1_rad: Array,
-    phase2_rad: Array,
-    amplitude1: Array,
-    amplitude2: Array,
+    phase_rad: Array,
+    amplitude: Array,
     noise: Array,
     model: MismatchModel,
     count: int,
     depth_m: Array,
     cost: Array,
 ) -> None:
-    """The best of `count` wrap candidates of each pixel, by the mismatch of its two frequencies.
+    """The best of `count` wrap candidates of each pixel, by the mismatch of its frequencies.
 
     Parameters
     ----------
-    phase1_rad, phase2_rad, amplitude1, amplitude2, noise : float32 [B, H, W]
+    phase_rad, amplitude : float32 [K, B, H, W]
+    noise : float32 [B, H, W]
     depth_m, cost : float32 [B, I, H, W]
         Fused distance, and -2 times the logarithm of the weight, infinite beyond the range; are
         written, the least cost first, of equals the nearest.
     """
     frames, kept, rows, columns = depth_m.shape
-    scale_m2, unsure, mismatch_m = np.empty((3, columns), np.float32)
+    frequencies = len(phase_rad)
+    scale_m2 = np.empty((frequencies, columns), np.float32)
+    unsure, fused_m2, mismatch_m = np.empty((3, columns), np.float32)
     fused_m = np.empty((count, columns), np.float32)
     costs = np.empty((count, columns), np.float32)
     ranks = np.empty((count, columns), np.float32)
-    squared1, squared2 = model.m_per_rad1 * model.m_per_rad1, model.m_per_rad2 * model.m_per_rad2
     # Loops over a row without branches take many pixels at once. They are short because the
     # compiler gives up on loops of more than a few arrays, which might overlap.
     for b in range(frames):
         for i in range(rows):
-            phase1, phase2, deviation = phase1_rad[b, i], phase2_rad[b, i], noise[b, i]
-            signal1, signal2 = amplitude1[b, i], amplitude2[b, i]
-            for j in range(columns):
-                ratio1 = deviation[j] / max(signal1[j], LEAST_AMPLITUDE)
-                ratio2 = deviation[j] / max(signal2[j], LEAST_AMPLITUDE)
-                variance1, variance2 = ratio1 * ratio1 * HALF, ratio2 * ratio2 * HALF
-                variance_m2 = squared1 * variance1 + squared2 * variance2
-                scale_m2[j] = model.mismatch_scale * (variance_m2 + model.systematic_m2)
-                unsure[j] = (variance1 + variance2) / model.phase_scale_rad2
+            first, deviation = phase_rad[0, b, i], noise[b, i]
+            unsure[:], fused_m2[:] = ZERO, ZERO
+            for k in range(frequencies):
+                signal, scale = amplitude[k, b, i], scale_m2[k]
+                squared, share = model.m_per_rad[k] * model.m_per_rad[k], model.shares[k]
+                own_share, kept_share = share * share, (ONE - share) * (ONE - share)
+                for j in range(columns):
+                    ratio = deviation[j] / max(signal[j], LEAST_AMPLITUDE)
+                    variance = ratio * ratio * HALF
+                    own_m2 = squared * variance
+                    unsure[j] += variance
+                    scale[j] = model.mismatch_scale * (fused_m2[j] + own_m2 + model.systematic_m2)
+                    fused_m2[j] = kept_share * fused_m2[j] + own_share * own_m2
+            unsure /= model.phase_scale_rad2
             for n in range(count):
-                wraps_m, fused, penalty = np.float32(n) * model.range1_m, fused_m[n], costs[n]
+                wraps_m, fused, penalty = np.float32(n) * model.ranges_m[0], fused_m[n], costs[n]
                 for j in range(columns):
-                    first_m = phase1[j] * model.m_per_rad1 + wraps_m
-                    gap = (first_m - phase2[j] * model.m_per_rad2) / model.range2_m
-                    mismatch_m[j] = (gap - np.rint(gap)) * model.range2_m
+                    fused[j] = first[j] * model.m_per_rad[0] + wraps_m
+                penalty[:] = ZERO
+                for k in range(1, frequencies):
+                    phase, scale, share = phase_rad[k, b, i], scale_m2[k], model.shares[k]
+                    m_per_rad, range_m = model.m_per_rad[k], model.ranges_m[k]
+                    for j in range(columns):
+                        gap = (fused[j] - phase[j] * m_per_rad) / range_m
+                        mismatch_m[j] = (gap - np.rint(gap)) * range_m
+                    for j in range(columns):
+                        penalty[j] += mismatch_m[j] * mismatch_m[j] / scale[j]
+                        fused[j] -= share * mismatch_m[j]
                 for j in range(columns):
-                    first_m = phase1[j] * model.m_per_rad1 + wraps_m
-                    fused[j] = max(first_m - model.share2 * mismatch_m[j], ZERO)
-                for j in range(columns):
-                    first_m = phase1[j] * model.m_per_rad1 + wraps_m
-                    whole = mismatch_m[j] * mismatch_m[j] / scale_m2[j] + unsure[j]
-                    penalty[j] = whole if first_m <= model.farthest_m else INFINITE
+                    first_m = first[j] * model.m_per_rad[0] + wraps_m
+                    whole = penalty[j] + unsure[j]
+                    near = (first_m <= model.farthest_m) | (frequencies == 1)
+                    penalty[j] = whole if near else INFINITE
+                    fused[j] = max(fused[j], ZERO)
             # The rank of a candidate is the number of those that go before it.
             ranks[:] = ZERO
             for n in range(count):

@@ -1,5 +1,9 @@
 from .camera import Camera as Camera, camera_of as camera_of
-from .depth_output import refuse_overwriting as refuse_overwriting, write_frames as write_frames
+from .depth_output import (
+    Points as Points,
+    refuse_overwriting as refuse_overwriting,
+    write_frames as write_frames,
+)
 from .frame_correction import (
     CorrectedFrame as CorrectedFrame,
     correct_recording as correct_recording,

@@ -3,26 +3,36 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+import torch
 
 from unwrap.depth import focal_px, points_of
 from unwrap.recordings.camera import Camera
 from unwrap.recordings.depth_picture import draw_frame
 from unwrap.recordings.frame_correction import CorrectedFrame
-from unwrap.recordings.images import HIGHEST_MM, depth_png
+from unwrap.recordings.images import HIGHEST_MM, depth_png, whole_millimetres
+from unwrap.recordings.pcd import encode_pcd
 from unwrap.recordings.recording import Recording
+from unwrap.ros import McapLog
 from unwrap.support import write_bytes
 
-OUTPUT_FILES = ("depth_m.npy", "valid.npy", "depth_mm.png", "points.ply", "picture.png")
-"""Names of the files of one frame."""
+Points = Literal["ply", "pcd"]
+"""Format of the points of a frame."""
 
 
-def refuse_overwriting(recording: Recording, out: Path) -> None:
-    """Check that no file stands where `write_frames` would write one.
+def output_files(points: Points) -> tuple[str, ...]:
+    """Names of the files of one frame."""
+    return ("depth_m.npy", "valid.npy", "depth_mm.png", f"points.{points}", "picture.png")
+
+
+def refuse_overwriting(
+    recording: Recording, out: Path, *, points: Points = "ply", mcap: Path | None = None
+) -> None:
+    """Check that no file stands where `write_frames` would write one, and none at `mcap`.
 
     Raises
     ------
@@ -30,7 +40,8 @@ def refuse_overwriting(recording: Recording, out: Path) -> None:
         One stands already; the message names it.
     """
     # All frames at once: half a recording written would be worse than none.
-    for path in (out / name / file for name in recording.names for file in OUTPUT_FILES):
+    files = [out / name / file for name in recording.names for file in output_files(points)]
+    for path in files if mcap is None else (*files, mcap):
         if path.exists():
             raise ValueError(f"{path} stands already; --overwrite replaces it")
 
@@ -40,12 +51,18 @@ def write_frames(
     camera: Camera,
     out: Path,
     *,
+    points: Points = "ply",
+    log: McapLog | None = None,
     tick: Callable[[], object] = lambda: None,
 ) -> dict[str, Any]:
     """Write the files of every frame, into a folder each where there are several.
 
     Parameters
     ----------
+    points : "ply" or "pcd"
+        Format of the points.
+    log : McapLog, optional
+        Takes every frame, too.
     tick : callable
         Called after each frame.
 
@@ -58,16 +75,20 @@ def write_frames(
     for frame in frames:
         # The frame of a recording without an axis of frames is named "": it lies in `out` itself.
         folder = out / frame.recording.names[0]
-        for name, content in encode_frame(frame, camera).items():
+        for name, content in encode_frame(frame, camera, points).items():
             write_bytes(folder / name, content)
+        if log is not None:
+            cloud = organised_cloud(frame, camera.horizontal_fov_deg)
+            # REP 118: along the axis of the camera, not along the ray of the pixel.
+            log.add(whole_millimetres(cloud[..., 0], frame.depth.valid[0].numpy()), cloud)
         numbers.append({"folder": str(folder), **frame_statistics(frame)})
         tick()
     shots = int(frames[0].recording.raw.shots)
     return {"shots": shots, "merge": camera.merge, "eight": camera.eight, "frames": numbers}
 
 
-def encode_frame(frame: CorrectedFrame, camera: Camera) -> dict[str, bytes]:
-    """Content of the files of one frame, by their names in `OUTPUT_FILES`."""
+def encode_frame(frame: CorrectedFrame, camera: Camera, points: Points) -> dict[str, bytes]:
+    """Content of the files of one frame, by their names in `output_files`."""
     depth_m, valid = frame.depth.distance_m[0].numpy(), frame.depth.valid[0].numpy()
     picture = io.BytesIO()
     draw_frame(frame, camera.description).save(picture, format="PNG")
@@ -75,10 +96,10 @@ def encode_frame(frame: CorrectedFrame, camera: Camera) -> dict[str, bytes]:
         _npy(depth_m.astype(np.float32)),
         _npy(valid),
         depth_png(depth_m, valid),
-        point_cloud(frame, camera.horizontal_fov_deg),
+        ENCODERS[points](frame, camera.horizontal_fov_deg),
         picture.getvalue(),
     )
-    return dict(zip(OUTPUT_FILES, encoded, strict=True))
+    return dict(zip(output_files(points), encoded, strict=True))
 
 
 def _npy(array: np.ndarray) -> bytes:
@@ -114,3 +135,28 @@ def point_cloud(frame: CorrectedFrame, horizontal_fov_deg: float) -> bytes:
         level = (frame.recording.gray[0][valid] * 255).round().byte().numpy()
         colors = np.stack([level, level, level, np.full_like(level, 255)], axis=-1)
     return trimesh.PointCloud(points.numpy(), colors=colors).export(file_type="ply")
+
+
+def organised_cloud(frame: CorrectedFrame, horizontal_fov_deg: float) -> np.ndarray:
+    """Points and intensity float32 [H, W, 4]: metres ahead, left and up, amplitude in LSB.
+
+    NaN where not valid.
+    """
+    depth = frame.depth
+    points = points_of(
+        depth.distance_m.double(), focal_px(depth.valid.shape[-1], horizontal_fov_deg)
+    )
+    maps = torch.cat((points[:, 0].float(), depth.amplitude))
+    return maps.where(depth.valid, torch.nan).movedim(0, -1).numpy()
+
+
+def pcd_cloud(frame: CorrectedFrame, horizontal_fov_deg: float) -> bytes:
+    """Binary PCD of the valid pixels: metres ahead, left and up, amplitude as intensity."""
+    return encode_pcd(organised_cloud(frame, horizontal_fov_deg)[frame.depth.valid[0].numpy()])
+
+
+ENCODERS: Mapping[Points, Callable[[CorrectedFrame, float], bytes]] = {
+    "ply": point_cloud,
+    "pcd": pcd_cloud,
+}
+"""Of points, by the name that the command line uses and the file's name ends with."""

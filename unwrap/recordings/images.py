@@ -99,13 +99,17 @@ def _read_frame(folder: Path) -> dict[str, np.ndarray]:
 
 
 def depth_png(distance_m: np.ndarray, valid: np.ndarray) -> bytes:
-    """PNG of distances [H, W] in whole millimetres; 0 where not `valid`.
+    """PNG of distances [H, W], see `whole_millimetres`."""
+    content = io.BytesIO()
+    Image.fromarray(whole_millimetres(distance_m, valid)).save(content, format="PNG")
+    return content.getvalue()
+
+
+def whole_millimetres(distance_m: np.ndarray, valid: np.ndarray) -> np.ndarray:
+    """Distances [H, W] as uint16 millimetres; 0 where not `valid`.
 
     Distances below 1 mm are stored as 1, beyond `HIGHEST_MM` as that.
     """
     millimetres = np.where(valid, distance_m, 0.0).astype(np.float64) * 1000
     # 0 says that there is no depth, so that the nearest depth is 1.
-    words = np.where(valid, millimetres.round().clip(1, HIGHEST_MM), 0).astype(np.uint16)
-    content = io.BytesIO()
-    Image.fromarray(words).save(content, format="PNG")
-    return content.getvalue()
+    return np.where(valid, millimetres.round().clip(1, HIGHEST_MM), 0).astype(np.uint16)

@@ -1,4 +1,4 @@
-"""Unambiguous ranges of one and of two modulation frequencies, and how near candidates come.
+"""Unambiguous ranges of one and of several modulation frequencies, and how near candidates come.
 
 Plain Python without torch, since the sensor's configuration is checked with it.
 """
@@ -24,15 +24,17 @@ def unambiguous_range_m(frequency_hz: float) -> float:
     return SPEED_OF_LIGHT_M_S / (2 * frequency_hz)
 
 
-def joint_range_m(f1_hz: float, f2_hz: float) -> float:
-    """Distance after which both phases repeat: c / (2 gcd(f1, f2)), with the frequencies in kHz.
+def joint_range_m(*frequencies_hz: float) -> float:
+    """Distance after which all phases repeat: c / (2 gcd(f1, f2, ...)), the frequencies in kHz.
 
     Examples
     --------
     >>> round(joint_range_m(24e6, 10e6), 2)
     74.95
+    >>> round(joint_range_m(80e6, 16e6, 120e6), 2)
+    18.74
     """
-    common = math.gcd(*(max(1, round(f / GRID_HZ)) for f in (f1_hz, f2_hz)))
+    common = math.gcd(*(max(1, round(f / GRID_HZ)) for f in frequencies_hz))
     return unambiguous_range_m(common * GRID_HZ)
 
 

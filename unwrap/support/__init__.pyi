@@ -9,7 +9,12 @@ from .compiled import (
     source_stamp as source_stamp,
 )
 from .error_text import in_one_line as in_one_line
-from .files import write_bytes as write_bytes, write_json as write_json, write_text as write_text
+from .files import (
+    replacing as replacing,
+    write_bytes as write_bytes,
+    write_json as write_json,
+    write_text as write_text,
+)
 from .npy_header import NpyHeader as NpyHeader, read_npy_header as read_npy_header
 from .process_state import (
     keep_freed_memory as keep_freed_memory,

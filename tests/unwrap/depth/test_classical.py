@@ -13,7 +13,6 @@ from peer_scenes import SENSOR, UNAMBIGUOUS_M, samples, steps, wraps_of
 from unwrap.depth.amplitude import Smoothness, min_sum, unwrap_amplitude
 from unwrap.depth.candidates import candidates_m
 from unwrap.depth.correction import correct
-from unwrap.depth.dual import unwrap_dual
 from unwrap.depth.kernel_density import (
     KernelDensity,
     density_by_torch,
@@ -21,6 +20,7 @@ from unwrap.depth.kernel_density import (
     unwrap_kernel_density,
 )
 from unwrap.depth.mismatch import hypotheses, hypotheses_by_torch
+from unwrap.depth.multi_frequency import unwrap_dual
 from unwrap.depth.reflectance import BRIGHTEST, ReflectancePrior, calibrate
 from unwrap.signal.calibrated import decode_at
 from unwrap.signal.decoding import decode
@@ -126,10 +126,11 @@ PARAMETERS = (
 def test_compiled_vote_is_that_of_torch(amplitude, parameters):
     """The same winner but where two densities tie within 1e-5 of each other."""
     noisy = samples(steps(), amplitude, 8, SENSOR.noise_lsb, seed=7)
-    first, second = (decode_at(i, noisy, SENSOR) for i in (0, 1))
-    model, kept = parameters.mismatch_model(SENSOR), min(parameters.hypotheses, 5)
-    depth_m, weight = hypotheses(first, second, SENSOR, 1.5, model, kept)
-    expected = hypotheses_by_torch(first, second, SENSOR, 1.5, model, kept)
+    frames = [decode_at(i, noisy, SENSOR) for i in (0, 1)]
+    model = parameters.mismatch_model((SENSOR.f1_hz, SENSOR.f2_hz), SENSOR.max_range_m)
+    kept = min(parameters.hypotheses, 5)
+    depth_m, weight = hypotheses(frames, 1.5, model, kept)
+    expected = hypotheses_by_torch(frames, 1.5, model, kept)
     same = (depth_m - expected[0]).abs() < 1e-4
     assert same.float().mean() > 0.9999  # Costs may tie, too.
     torch.testing.assert_close(weight[same], expected[1][same], rtol=1e-3, atol=1e-6)
