@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 from jsonargparse import ArgumentParser, Namespace
 from jsonargparse.typing import NonNegativeInt, PositiveInt
 
@@ -67,7 +68,7 @@ def collect(arguments: Namespace) -> int:
     return DONE
 
 
-def record_arguments(parser: ArgumentParser) -> None:
+def rerun_arguments(parser: ArgumentParser) -> None:
     """Which file, which drive, who plays it, and the experiment."""
     parser.add_argument("file", type=Path, help="recording to write, such as runs/drive.rrd")
     parser.add_argument(
@@ -77,7 +78,7 @@ def record_arguments(parser: ArgumentParser) -> None:
     add_experiment(parser)
 
 
-def record(arguments: Namespace) -> int:
+def rerun(arguments: Namespace) -> int:
     """Play a drive and write it."""
     from agents.evaluation import make_envs, play_drives
     from agents.report import require_rerun, write_recording
@@ -96,11 +97,12 @@ def record(arguments: Namespace) -> int:
             arguments.file, problem, played, f"drive {arguments.seed}, {name}", tick=bar.update
         )
     print(f"{frames} frames are in {arguments.file}; `rerun {arguments.file}` shows them.")
-    write_numbers(arguments, {name: float(values[0]) for name, values in played.per_drive.items()})
+    known = {name: float(of[0]) for name, of in played.per_drive.items() if np.isfinite(of[0])}
+    write_numbers(arguments, known)
     return DONE
 
 
 COMMANDS = (
     Command("collect", "write drives as a Minari data set", collect_arguments, collect),
-    Command("rerun", "write a drive for the Rerun viewer", record_arguments, record),
+    Command("rerun", "write a drive for the Rerun viewer", rerun_arguments, rerun),
 )

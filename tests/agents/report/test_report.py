@@ -156,7 +156,8 @@ def test_a_policy_whose_temporal_error_is_not_known_has_a_dash():
     results = made_up_results()
     results["policies"]["always_4"]["temporal_error_m"] = None
     del results["policies"]["always_8"]["temporal_error_m"]
-    shown = text_of_table(render_page(results, made_up_timeline(), made_up_strip()), "tails")
+    page = render_page(results, made_up_timeline(), made_up_choices(), made_up_strip())
+    shown = text_of_table(page, "tails")
     dashed = [row for row in shown.split("</tr>") if "<td>\u2013</td>" in row]
     assert len(dashed) == 2 and all(re.search("Always [48] DCS", row) for row in dashed)
 
