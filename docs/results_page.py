@@ -44,7 +44,8 @@ def page(found: dict[str, Any], picture: str, command: str) -> str:
         "## How to read the tables",
         LEGEND.format(confidence=f"{plan['study']['confidence']:.0%}".replace("%", " %")),
         f"Made by `{command}` with training seeds {', '.join(map(str, plan['seeds']))}, in "
-        f"{found['seconds'] / 3600:.1f} hours of one core. {versions}.",
+        f"{found['seconds'] / 3600:.1f} hours of one core, without trainings "
+        f"that stood already. {versions}.",
         SUBMIT,
     ]
     return "\n\n".join(parts) + "\n"

@@ -138,10 +138,12 @@ def test_the_study_that_ships_can_be_read():
     plan = read_config(StudyPlan, configs_dir() / "study" / "results.yaml")
     jobs = jobs_of(plan)
     assert len(plan.seeds) >= 5
-    # References and fifteen rules once; five learners and random with each seed; four ablations.
-    default = 1 + 15 + (6 + 4) * len(plan.seeds)
-    # References and two rules; two learners and random with each seed.
-    assert len(jobs) == default + len(plan.transfer.tables) * (1 + 2 + 3 * len(plan.seeds))
+    seeds = len(plan.seeds)
+    # References and fifteen rules once; three learners and random with each seed; four ablations.
+    default = 1 + 15 + (4 + 4) * seeds
+    # References and a rule; one learner there, two in each table of the transfer.
+    hot, elsewhere = 1 + 1 + seeds, len(plan.transfer.tables) * (1 + 1 + 2 * seeds)
+    assert len(jobs) == default + hot + elsewhere
     greedy = next(job for job in jobs if job.policy == "greedy")
     assert greedy.config.agent.regression.horizon == 1
 
