@@ -261,6 +261,12 @@ def test_no_name_stands_for_two_files():
     assert sorted({name for name in names if names.count(name) > 1} - same) == []
 
 
+def test_no_name_stands_for_two_files_of_tests():
+    # Test files are modules without packages: pytest refuses to import a second of a name.
+    names = [path.name for path in ROOT.glob("tests/**/*.py") if path.name != "conftest.py"]
+    assert sorted({name for name in names if names.count(name) > 1}) == []
+
+
 @pytest.mark.parametrize(
     ("package", "heavy"),
     [
