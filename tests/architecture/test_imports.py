@@ -33,6 +33,8 @@ room("unwrap.networks", *SIGNAL, "unwrap.depth")
 room("unwrap.networks.peers", *UNWRAPPING)
 room("unwrap.training", *UNWRAPPING)
 room("unwrap.recordings", *UNWRAPPING, "unwrap.pictures")
+room("unwrap.cameras.files", "unwrap.support", "unwrap.signal", "unwrap.recordings")
+room("unwrap.cameras", *UNWRAPPING, "unwrap.recordings", "unwrap.cameras.files")
 room("unwrap.export", *UNWRAPPING, "unwrap.training")
 room("unwrap.comparison", *UNWRAPPING, "unwrap.training", "unwrap.pictures")
 room("unwrap", *UNWRAPPING)
@@ -129,6 +131,7 @@ ONLY_IN = {
     "onnx": ("unwrap/export/", "agents/deploy/"),
     "onnxruntime": ("unwrap/export/", "agents/deploy/"),
     "openvino": "unwrap/networks/",
+    "h5py": "unwrap/cameras/files/",
 }
 SOURCES = sorted(
     path.relative_to(ROOT).as_posix()

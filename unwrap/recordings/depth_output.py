@@ -14,15 +14,14 @@ from unwrap.recordings.camera import Camera
 from unwrap.recordings.depth_picture import draw_frame
 from unwrap.recordings.frame_correction import CorrectedFrame
 from unwrap.recordings.images import HIGHEST_MM, depth_png
-from unwrap.recordings.recording import Recording
 from unwrap.support import write_bytes
 
 OUTPUT_FILES = ("depth_m.npy", "valid.npy", "depth_mm.png", "points.ply", "picture.png")
 """Names of the files of one frame."""
 
 
-def refuse_overwriting(recording: Recording, out: Path) -> None:
-    """Check that no file stands where `write_frames` would write one.
+def refuse_overwriting(names: Sequence[str], out: Path) -> None:
+    """Check that no file stands where `write_frames` would write one of the frames of these names.
 
     Raises
     ------
@@ -30,7 +29,7 @@ def refuse_overwriting(recording: Recording, out: Path) -> None:
         One stands already; the message names it.
     """
     # All frames at once: half a recording written would be worse than none.
-    for path in (out / name / file for name in recording.names for file in OUTPUT_FILES):
+    for path in (out / name / file for name in names for file in OUTPUT_FILES):
         if path.exists():
             raise ValueError(f"{path} stands already; --overwrite replaces it")
 
@@ -75,7 +74,7 @@ def encode_frame(frame: CorrectedFrame, camera: Camera) -> dict[str, bytes]:
         _npy(depth_m.astype(np.float32)),
         _npy(valid),
         depth_png(depth_m, valid),
-        point_cloud(frame, camera.horizontal_fov_deg),
+        point_cloud(frame, camera),
         picture.getvalue(),
     )
     return dict(zip(OUTPUT_FILES, encoded, strict=True))
@@ -101,13 +100,16 @@ def frame_statistics(frame: CorrectedFrame) -> dict[str, float | int | str]:
     }
 
 
-def point_cloud(frame: CorrectedFrame, horizontal_fov_deg: float) -> bytes:
+def point_cloud(frame: CorrectedFrame, camera: Camera) -> bytes:
     """Binary little-endian PLY of the valid pixels: metres ahead, left and up, gray as colour."""
     import trimesh  # Here: it takes long to load, and only this needs it.
 
-    valid, width = frame.depth.valid[0], frame.depth.valid.shape[-1]
-    focal = focal_px(width, horizontal_fov_deg)
-    points = points_of(frame.depth.distance_m.double(), focal)[:, 0, valid].T
+    valid, distance_m = frame.depth.valid[0], frame.depth.distance_m.double()
+    if camera.rays is None:
+        focal = focal_px(valid.shape[-1], camera.horizontal_fov_deg)
+        points = points_of(distance_m, focal)[:, 0, valid].T
+    else:
+        points = (camera.rays * distance_m)[:, valid].T
     colors = None
     if frame.recording.gray is not None:
         # Four channels, the last opaque: trimesh colours have no other form.
