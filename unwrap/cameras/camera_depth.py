@@ -47,7 +47,6 @@ def sensor_of(
         # A hair less than the joint range, at whose end the first candidate comes again.
         spacing_m = candidate_spacing_m(first_hz, second_hz, range_m * (1 - 1e-6))
         agreeing_m = AGREEING_SHARE * spacing_m
-    noise = {} if camera.noise_lsb is None else {"noise_lsb": camera.noise_lsb}
     return SensorDescription(
         f1_hz=first_hz,
         f2_hz=second_hz,  # Of one frequency alone it is never asked for.
@@ -55,7 +54,7 @@ def sensor_of(
         # No distance is mistrusted for being close to the range's end.
         saturation_range_m=unambiguous_range_m(first_hz),
         max_residual_m=agreeing_m,
-        **noise,
+        noise_lsb=SensorDescription.noise_lsb if camera.noise_lsb is None else camera.noise_lsb,
     )
 
 

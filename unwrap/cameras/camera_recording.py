@@ -180,9 +180,10 @@ def open_camera_recording(
 
 def _gray_file(path: Path, source: FrameSource) -> FrameSource | np.ndarray:
     """Passive images of a file of their own, one for each frame."""
+    images: FrameSource | np.ndarray
     if path.suffix in (".h5", ".hdf5") and isinstance(source, EsprosFile):
-        file = EsprosFile(path, source.camera, GRAY)
-        found, images = (len(file.names), *file.shape[1:]), file
+        images = EsprosFile(path, source.camera, GRAY)
+        found = (len(images.names), *images.shape[1:])
     else:
         array = read_map(path, "gray")
         images = array[None] if array.ndim == 2 else array

@@ -155,7 +155,8 @@ def _planes_at(
     reach_px: int,
 ) -> tuple[np.ndarray, tuple[float, ...]]:
     """Planes [K, P, values] as stored around a pixel, and the frequencies."""
-    parts, frequencies = [], ()
+    parts: list[np.ndarray] = []
+    frequencies: tuple[float, ...] = ()
     row, column = at
     for frames in pieces:
         height, width = frames.saturated.shape[-2:]

@@ -59,12 +59,10 @@ def _integers(
     low, high = words.limits
     outside = ~coded & ((values < low) | (values > high))
     _refuse(outside, planes, f"words of {low}..{high} ({words.bits} bits)", where, names)
-    flagged = coded
-    if words.ends_overflow:
-        flagged = flagged | (values == low) | (values == high)
+    ends = ((values == low) | (values == high)) & words.ends_overflow
     # A code is no sample: in its place stands the middle, and the flag says so.
     samples = np.where(coded, 0, values - words.mid_scale).astype(np.float32)
-    return samples, flagged.any(axis=1)
+    return samples, np.any(coded | ends, axis=1)
 
 
 def gray_of(

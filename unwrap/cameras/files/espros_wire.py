@@ -51,7 +51,8 @@ class WireFrames:
         """All images, and their rows and columns; headers alone are read."""
         try:
             with self.path.open("rb") as file:
-                images, size, end = [], None, self.path.stat().st_size
+                images: list[_Image] = []
+                size, end = None, self.path.stat().st_size
                 while file.tell() < end:
                     frame = sum(not image.is_gray for image in images)
                     head = file.read(HEADER.size)
