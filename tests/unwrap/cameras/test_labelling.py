@@ -31,8 +31,8 @@ def fits(found):
 
 @pytest.mark.parametrize("name", ["mlx75027", "mlx75027_reversed"])
 def test_the_right_order_fits_whichever_is_described(tmp_path, name):
-    # 0.37 of the range: no multiple of an eighth, at which mirrored orders meet.
-    known_m = 2.37 * unambiguous_range_m(60e6)
+    # 0.30 of the range: no multiple of an eighth, at which mirrored orders meet.
+    known_m = 2.30 * unambiguous_range_m(60e6)
     for told in ("mlx75027", "mlx75027_reversed"):
         recording, camera = recorded(
             tmp_path, name, [60e6], known_m, camera=told, offset=25, noise=4
@@ -54,12 +54,12 @@ def test_several_orders_fit_where_the_phase_is_a_multiple_of_45_degrees(tmp_path
     known_m = 0.125 * unambiguous_range_m(60e6)
     recording, camera = recorded(tmp_path, "mlx75027", [60e6], known_m, noise=4)
     found = fitting(recording.pieces(), camera, known_m, AT)
-    # 45 degrees: cosine and sine are equal, and may change places.
-    assert fits(found) == {(0, 180, 90, 270), (90, 270, 0, 180)}
-    assert (
-        "2 orders fit; one distance does not tell them apart"
-        in labelling_lines(found, known_m, AT)[-1]
-    )
+    # 45 degrees: cosine and sine are equal, so that each may be the other, and so may their
+    # opposites.
+    orders = {(0, 180, 90, 270), (90, 270, 0, 180), (0, 270, 90, 180), (90, 180, 0, 270)}
+    assert fits(found) == orders
+    told = labelling_lines(found, known_m, AT)[-1]
+    assert "4 orders fit; one distance does not tell them apart" in told
 
 
 def test_a_second_frequency_tells_orders_apart(tmp_path):
@@ -82,7 +82,7 @@ def test_none_fits_a_wrong_distance(tmp_path):
 def test_three_phases_and_phasors_have_their_own_orders(tmp_path):
     assert len(labellings(described("kinect_v2_dump"))) == 12
     assert len(labellings(described("phasor_video"))) == 8
-    known_m = 0.37 * unambiguous_range_m(30e6)
+    known_m = 0.30 * unambiguous_range_m(30e6)
     stored = planes("phasor_video", [np.full(SIZE, known_m)] * 3, [30e6], amplitude=2.0, noise=0.02)
     np.save(tmp_path / "a.npy", np.moveaxis(-stored[:, 0], 1, -1))
     camera = described("phasor_video")

@@ -260,6 +260,6 @@ def test_hdf5_without_its_package(tmp_path, monkeypatch):
     ],
 )
 def test_descriptions_that_cannot_be(tmp_path, name, changes, says):
-    with pytest.raises(ConfigError, match=".") as error:
+    with pytest.raises(ConfigError) as error:
         described(small_camera(tmp_path, name, **changes))
     assert says in str(error.value)
