@@ -6,7 +6,7 @@ from pathlib import Path
 
 from unwrap.cameras.camera_frames import CameraFrames
 from unwrap.cameras.files import CameraDescription
-from unwrap.cameras.lens import rays_of
+from unwrap.cameras.pixel_rays import rays_of
 from unwrap.depth import Eight, Merge
 from unwrap.networks import Unwrapper
 from unwrap.recordings import (

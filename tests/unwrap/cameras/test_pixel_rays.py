@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from unwrap.cameras.files import LensConfig
-from unwrap.cameras.lens import rays_of
+from unwrap.cameras.pixel_rays import rays_of
 
 SIZE = (24, 32)
 
