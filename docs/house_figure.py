@@ -86,14 +86,14 @@ PLACES = {
     "shotenv.laser": Box(490, 650, *FRONT),
     "shotenv.decision": Box(658, 818, *FRONT),
     "shotenv.env": Box(826, 950, FRONT[0], BACK[1]),
-    "unwrap.recordings": Box(30, 178, 234, MAIN[1]),
-    "unwrap.cameras": Box(30, 178, MAIN[0], 227),
-    "unwrap.cameras.files": Box(40, 168, 168, 194),
-    "unwrap.signal": Box(186, 366, *MAIN),
-    "unwrap.networks": Box(374, 604, *MAIN),
-    "unwrap.networks.peers": Box(384, 594, 168, 194),
-    "unwrap.depth": Box(612, 794, *MAIN),
-    "unwrap.training": Box(802, 970, *MAIN),
+    "unwrap.cameras": Box(30, 144, *MAIN),
+    "unwrap.cameras.files": Box(40, 134, 168, 194),
+    "unwrap.recordings": Box(152, 272, *MAIN),
+    "unwrap.signal": Box(280, 412, *MAIN),
+    "unwrap.networks": Box(420, 624, *MAIN),
+    "unwrap.networks.peers": Box(430, 614, 168, 194),
+    "unwrap.depth": Box(632, 800, *MAIN),
+    "unwrap.training": Box(808, 970, *MAIN),
     "unwrap.comparison": Box(30, 210, *CELLAR),
     "unwrap.export": Box(218, 440, *CELLAR),
     "unwrap.pictures": Box(448, 640, *CELLAR),
@@ -109,7 +109,7 @@ WAY: Points = (
 )
 """What a frame becomes, from the world to the report."""
 JOINING: tuple[Points, ...] = (
-    ((104, LOWER), (343, LOWER)),
+    ((212, LOWER), (343, LOWER)),
     ((540, MIDDLE), (636, MIDDLE)),
 )
 """Recordings of a real camera, and what the shots cost, join it."""
@@ -119,7 +119,7 @@ DOORS: dict[str, tuple[float, float]] = {
     "shotenv.world": (104, MIDDLE),
     "shotenv.render": (236, MIDDLE),
     "shotenv.sensor": (343, MIDDLE),
-    "unwrap.recordings": (104, LOWER),
+    "unwrap.recordings": (212, LOWER),
     "unwrap.signal": (343, LOWER),
     "unwrap.networks": (489, LOWER),
     "unwrap.depth": (636, LOWER),
@@ -132,7 +132,7 @@ DOORS: dict[str, tuple[float, float]] = {
 }
 """Where rooms open to the hallway."""
 HEADS: tuple[tuple[str, tuple[float, float]], ...] = (
-    *((">", (127, MIDDLE)), (">", (224, LOWER)), (">", (466, LOWER)), (">", (936, MIDDLE))),
+    *((">", (127, MIDDLE)), (">", (282, LOWER)), (">", (466, LOWER)), (">", (936, MIDDLE))),
     *(("^", (966, 540)), ("<", (740, UPPER)), ("<", (400, UPPER))),
 )
 """Which way it goes."""

@@ -1,4 +1,4 @@
-"""Frames of real cameras in one order and unit, their depth, and how their planes are labelled."""
+"""Cameras' own files become frames in one order and unit."""
 
 import lazy_loader
 
