@@ -118,7 +118,13 @@ def correct_camera_files(arguments: Namespace) -> int:
 
     Long recordings are read piece by piece, twice: once to find out what is wrong with them.
     """
-    from unwrap.cameras import camera_for, correct_frames, open_camera_recording, sensor_of
+    from unwrap.cameras import (
+        camera_for,
+        correct_frames,
+        dropped_frames,
+        open_camera_recording,
+        sensor_of,
+    )
     from unwrap.networks import load_unwrapper
     from unwrap.recordings import frequency_warning, refuse_overwriting, write_frames
 
@@ -148,6 +154,7 @@ def correct_camera_files(arguments: Namespace) -> int:
         if (warning := frequency_warning(network, sensor, recording.size)) is not None:
             say(f"warning: {warning}")
     where, found = str(arguments.input), None
+    times: list[float] = []
     if len(first) < len(recording.names):
         for _ in recording.pieces():
             pass  # What is refused is refused before anything is written.
@@ -158,8 +165,12 @@ def correct_camera_files(arguments: Namespace) -> int:
             )
             written = write_frames(frames, settings, arguments.out, tick=bar.update)
             found = written if found is None else _joined(found, written)
+            times += piece.timestamp_s or ()
     assert found is not None  # No recording is without frames.
     tell_of_frames(found)
+    # Each frame has its depth all the same: who follows them over time must know.
+    for sentence in dropped_frames(times, recording.names):
+        say(f"warning: {where}: {sentence}")
     write_numbers(arguments, found)
     return DONE
 

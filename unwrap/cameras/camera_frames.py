@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -77,17 +77,8 @@ class CameraFrames:
 
     def at_highest_frequency(self) -> CameraFrames:
         """The samples at the first frequency alone."""
-        return CameraFrames(
-            self.samples_lsb[:, :1],
-            self.saturated,
-            self.gray,
-            self.frequencies_hz[:1],
-            self.made,
-            self.names,
-            self.temperature_k,
-            self.integration_s,
-            self.laser_power_w,
-            self.timestamp_s,
+        return replace(
+            self, samples_lsb=self.samples_lsb[:, :1], frequencies_hz=self.frequencies_hz[:1]
         )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -84,12 +84,11 @@ class CameraRecording:
     def read(self, start: int, stop: int) -> CameraFrames:
         """Frames `start` to `stop`; see `pieces` for what is refused."""
         camera, where = self.camera, str(self.source.path)
-        stored, names = self.source.read(start, stop), self.names[start:stop]
+        stored, names = self._without_gray_plane(start, stop), self.names[start:stop]
         samples, saturated = samples_of(stored.planes, camera, where, names)
         frequencies = self._frequencies(stored)
         by_frequency = samples.reshape(len(names), len(frequencies), -1, *samples.shape[2:])
         ordered, made = canonical(by_frequency, camera.samples)
-        # Where the words are good a fit of them is, too, and the other way round.
         descending = sorted(range(len(frequencies)), key=lambda k: -frequencies[k])
         gray = self._gray(stored, start, stop)
         return CameraFrames(
@@ -102,20 +101,34 @@ class CameraRecording:
             **{name: self._told(stored, name, names) for name in BESIDE},
         )
 
+    def _without_gray_plane(self, start: int, stop: int) -> StoredFrames:
+        """Frames as stored, where a plane is the gray image with that apart."""
+        stored, passive = self.source.read(start, stop), self.camera.passive
+        if passive.where == "plane" and passive.plane is not None:
+            gray = stored.planes[:, passive.plane]
+            return replace(stored, planes=np.delete(stored.planes, passive.plane, 1), gray=gray)
+        if stored.gray is not None and passive.where != "recording":
+            raise ValueError(
+                f"{self.source.path}: gray images are in the recording; expected none, as "
+                f"passive.where of {self.camera.name} is {passive.where!r}"
+            )
+        return stored
+
     def _frequencies(self, stored: StoredFrames) -> tuple[float, ...]:
         """Frequencies in the order of the planes, from the file where it tells them."""
         told, camera = stored.frequencies_hz, self.camera
         if told is None:
             return camera.frequencies_hz
-        allowed = (*camera.selectable_hz, *camera.frequencies_hz)
-        unknown = [hz for hz in told if not any(abs(hz - known) < 1.0 for known in allowed)]
-        if unknown or len(told) != len(camera.frequencies_hz):
+        allowed = sorted({*camera.selectable_hz, *camera.frequencies_hz}, reverse=True)
+        # As described, to the last bit: files may tell megahertz.
+        found = tuple(known for hz in told for known in allowed if abs(hz - known) < 1.0)
+        if len(found) != len(told) or len(told) != len(camera.frequencies_hz):
             raise ValueError(
                 f"{self.source.path}: modulation frequencies are {', '.join(map(_mhz, told))}; "
                 f"expected {len(camera.frequencies_hz)} of {', '.join(map(_mhz, allowed))}, as "
                 f"{camera.name} has them"
             )
-        return told
+        return found
 
     def _gray(self, stored: StoredFrames, start: int, stop: int) -> np.ndarray | None:
         """Passive images [F, H, W] in 0..1, from a file of their own or from the recording."""

@@ -230,6 +230,14 @@ def test_no_simulated_wiggle_is_taken_away_unless_asked(correct, tmp_path):
     assert "has tables at 60 and 25 MHz; expected 24 MHz" in correct(*words, *simulated, status=1)
 
 
+def test_dropped_frames_are_told_and_the_others_corrected(correct, tmp_path):
+    stored = whole(planes("epc660", [2 + SLOPE_M] * 4, [24e6]))[:, 0]
+    write_espros(tmp_path / "a.h5", stored, times=[0, 0.1, 0.2, 0.5])
+    _, err = correct(tmp_path / "a.h5", "--camera", "epc660_hdf5", "--unwrapper", "none")
+    assert "warning: " in err and "a.h5: frame 00003 comes 0.3 s after frame 00002" in err
+    assert (tmp_path / "out/00003/depth_m.npy").is_file()
+
+
 def test_plain_recordings_need_no_network_for_the_wrapped_distance(correct, tmp_path):
     wall_m = 7.0 + SLOPE_M
     stored = whole(planes("epc660", [wall_m], [24e6]))[0, 0]

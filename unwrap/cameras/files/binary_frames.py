@@ -36,7 +36,7 @@ class BinaryFrames:
         """Planes, rows and columns of a frame."""
         height, width = self.camera.layout.height, self.camera.layout.width
         assert height is not None and width is not None  # The description has seen to it.
-        return self.camera.planes, height, width
+        return self.camera.stored_planes, height, width
 
     @property
     def frame_bytes(self) -> int:

@@ -138,9 +138,11 @@ class SamplesConfig(Section):
 class PassiveConfig(Section):
     """Where the gray image without laser light is."""
 
-    where: Literal["none", "recording", "file"] = Field(
-        "none", description="nowhere, in the recording itself, or in a file of its own (--gray)"
+    where: Literal["none", "recording", "plane", "file"] = Field(
+        "none",
+        description="nowhere, in the recording, one of its planes, or a file of its own (--gray)",
     )
+    plane: int | None = Field(None, ge=0, le=64, description="number of that plane, from 0")
     highest: Positive = Field(4095.0, description="stored value of full scale")
 
 
@@ -229,8 +231,13 @@ class CameraDescription(Section):
 
     @property
     def planes(self) -> int:
-        """Planes of a frame, the passive one not counted."""
+        """Samples of a frame."""
         return len(self.frequencies_hz) * len(self.samples.phase_deg)
+
+    @property
+    def stored_planes(self) -> int:
+        """Planes of a frame as stored, a passive one counted."""
+        return self.planes + (self.passive.where == "plane")
 
     @property
     def range_m(self) -> float:
@@ -253,6 +260,13 @@ class CameraDescription(Section):
             )
         if len(set(self.frequencies_hz)) < len(self.frequencies_hz):
             raise ValueError(f"frequencies_hz is {self.frequencies_hz}; expected different ones")
+        if self.passive.where == "plane":
+            fits = self.passive.plane is not None and self.passive.plane <= self.planes
+            if self.container not in ("arrays", "dump") or not fits:
+                raise ValueError(
+                    f"passive.plane is {self.passive.plane}; expected 0 to {self.planes}, and a "
+                    "container of plain planes (arrays, dump)"
+                )
         width, row_bytes = self.layout.width or 0, self.layout.row_bytes or 0
         if self.container == "packed_raw12" and (width % 2 or row_bytes < width // 2 * 3):
             raise ValueError(

@@ -60,9 +60,9 @@ class ArrayFrames:
         order = [axes.index(letter) for letter in "FPHW" if letter in axes]
         planes = dcs.transpose(order)
         planes = planes if "F" in axes else planes[None]
-        if planes.shape[1] != self.camera.planes:
+        if planes.shape[1] != self.camera.stored_planes:
             raise ValueError(
-                f"{self.path}: {planes.shape[1]} planes; expected {self.camera.planes} of "
+                f"{self.path}: {planes.shape[1]} planes; expected {self.camera.stored_planes} of "
                 f"{self.camera.name}"
             )
         return planes

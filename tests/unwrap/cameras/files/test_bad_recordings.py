@@ -208,6 +208,13 @@ def test_gray_images_that_do_not_go_with_the_samples(tmp_path):
         list(open_camera_recording(path, described("mlx75027"), gray=gray).pieces())
 
 
+def test_gray_images_where_the_description_has_none(tmp_path):
+    camera = small_camera(tmp_path, "mlx75027", passive={"where": "file"})
+    gray = np.zeros((2, HEIGHT, WIDTH))
+    np.savez(tmp_path / "a.npz", dcs=dcs("mlx75027", 60e6), gray=gray)
+    assert "passive.where of mlx75027 is 'file'" in refused(tmp_path / "a.npz", camera)
+
+
 def test_frames_that_are_too_large(tmp_path, monkeypatch):
     np.save(tmp_path / "a.npy", dcs("mlx75027", 60e6))
     monkeypatch.setattr("unwrap.cameras.camera_recording.LARGEST_FRAME_BYTES", 700)
@@ -253,6 +260,7 @@ def test_hdf5_without_its_package(tmp_path, monkeypatch):
         ("mlx75027", {"frequencies_hz": [6e7, 6e7]}, "expected different ones"),
         ("mlx75027", {"words": {"stored_bits": 8}}, "stored_bits is 8"),
         ("mlx75027", {"words": {"bit": 12}}, "unknown key words.bit"),
+        ("mlx75027", {"passive": {"where": "plane", "plane": 5}}, "expected 0 to 4"),
         ("imx556", {"layout": {"row_bytes": 959}}, "row_bytes is 959"),
         ("imx556", {"layout": {"height": None}}, "layout.height is missing"),
         ("mlx75027", {"lens": {"rays": "r.npy"}}, "several ways"),

@@ -119,6 +119,18 @@ def test_plain_arrays_and_their_two_orders(tmp_path, name):
     assert_distances(frames, WALLS, atol=1e-3)
 
 
+def test_a_gray_image_among_the_planes(tmp_path):
+    passive = {"where": "plane", "plane": 2}
+    camera = small_camera(tmp_path, "mlx75027", passive=passive)
+    stored = whole(planes("mlx75027", WALLS, [60e6]))[:, 0]
+    gray = np.random.default_rng(0).integers(0, 4096, (2, HEIGHT, WIDTH))
+    five = np.insert(stored, 2, gray, axis=1)
+    np.save(tmp_path / "a.npy", five)
+    frames = all_frames(opened(tmp_path / "a.npy", camera))
+    np.testing.assert_allclose(frames.gray.numpy(), gray / 4095, atol=1e-6)
+    assert_distances(frames, WALLS, atol=1e-3)
+
+
 def test_folders_of_images(tmp_path):
     camera = small_camera(tmp_path, "mlx75027", words={"signed": False, "mid_scale": 2048})
     stored = whole(planes("mlx75027", WALLS, [60e6]))[:, 0] + 2048
