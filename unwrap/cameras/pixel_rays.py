@@ -37,9 +37,11 @@ def rays_of(lens: LensConfig, size: tuple[int, int], folder: Path) -> Tensor:
 
     Examples
     --------
-    >>> rays = rays_of(LensConfig(focal_px=(100, 100)), (1, 1), Path())
-    >>> rays.flatten().tolist()
-    [1.0, 0.0, 0.0]
+    Two pixels across 90 degrees: their centres lie half way between the middle and the edges.
+
+    >>> ahead, left, up = rays_of(LensConfig(horizontal_fov_deg=90), (1, 2), Path())
+    >>> (left / ahead).round(decimals=6).tolist()
+    [[0.5, -0.5]]
     """
     height, width = size
     if lens.rays is not None:
