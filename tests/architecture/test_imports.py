@@ -34,6 +34,8 @@ room("unwrap.networks.peers", *UNWRAPPING)
 room("unwrap.training", *UNWRAPPING)
 room("unwrap.ros", "unwrap.support")
 room("unwrap.recordings", *UNWRAPPING, "unwrap.pictures", "unwrap.ros")
+room("unwrap.cameras.files", "unwrap.support", "unwrap.signal", "unwrap.recordings")
+room("unwrap.cameras", *UNWRAPPING, "unwrap.recordings", "unwrap.cameras.files")
 room("unwrap.export", *UNWRAPPING, "unwrap.training")
 room("unwrap.comparison", *UNWRAPPING, "unwrap.training", "unwrap.pictures")
 room("unwrap", *UNWRAPPING)
@@ -132,6 +134,7 @@ ONLY_IN = {
     "onnx": ("unwrap/export/", "agents/deploy/"),
     "onnxruntime": ("unwrap/export/", "agents/deploy/"),
     "openvino": "unwrap/networks/",
+    "h5py": "unwrap/cameras/files/",
 }
 SOURCES = sorted(
     path.relative_to(ROOT).as_posix()
