@@ -1,4 +1,4 @@
-"""Make up what a laboratory records to calibrate a camera: dark frames, a still scene, a wall, warmth.
+"""Make up what a laboratory records to calibrate a camera.
 
     python examples/calibration_recordings.py bench [--seed 1]
     shotenv camera calibrate bench --out bench/sensor.yaml
@@ -192,7 +192,9 @@ def bench(camera: Camera) -> list[tuple[dict, Scene, int]]:
         planned.append((known, Scene(wall_m * camera.stretch, light_e, dark), 8))
     for kelvin in WARM_K:
         known = {"kind": "warm", **room, "temperature_k": kelvin}
-        planned.append((known, Scene(slope_m, 0.5 * most_e * (0.3 + 0.7 * across), dark, kelvin), 8))
+        planned.append(
+            (known, Scene(slope_m, 0.5 * most_e * (0.3 + 0.7 * across), dark, kelvin), 8)
+        )
     return planned
 
 
@@ -214,7 +216,7 @@ def main(folder: Path, seed: int) -> None:
     # JSON is YAML, too; one recording a line.
     lines = ",\n  ".join(json.dumps(row) for row in rows)
     (folder / "calibration.yaml").write_text(
-        f'name: made-up-{seed}\nhorizontal_fov_deg: {FOV_DEG}\nrecordings: [\n  {lines}\n]\n'
+        f"name: made-up-{seed}\nhorizontal_fov_deg: {FOV_DEG}\nrecordings: [\n  {lines}\n]\n"
     )
     hidden = camera.sensor.model_dump(mode="json") | {"distance_offset_m": camera.delay_m}
     (folder / "hidden.yaml").write_text(json.dumps(hidden, indent=1))

@@ -15,6 +15,7 @@ from jsonargparse import ArgumentError, Namespace
 
 from agents.cli import (
     bank_commands,
+    camera_calibrate_command,
     collect_command,
     doctor_command,
     export_command,
@@ -36,6 +37,7 @@ COMMANDS: tuple[Command, ...] = (
     *export_command.COMMANDS,
     *bank_commands.COMMANDS,
     *unwrap_commands.COMMANDS,
+    *camera_calibrate_command.COMMANDS,
 )
 
 

@@ -114,7 +114,7 @@ def fronts(results: dict[str, Any]) -> go.Figure:
     figure.update_yaxes(title="mean absolute depth error, m", rangemode="tozero", **AXIS)
     # Below the chart: beside it the names would leave a phone no room for the points.
     legend = {"orientation": "h", "x": 0, "y": -0.2, "yanchor": "top", "traceorder": "reversed"}
-    return _styled(figure, height=520, legend=legend)
+    return styled(figure, height=520, legend=legend)
 
 
 def undominated(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -171,7 +171,7 @@ def shares_by_family(results: dict[str, Any], names: tuple[str, ...]) -> go.Figu
             )
     figure.update_xaxes(range=[0, 1], tickformat=".0%", showgrid=False, zeroline=False)
     figure.update_layout(barmode="stack", bargap=0.28, legend=LEGEND | {"traceorder": "normal"})
-    return _styled(figure, height=360, left=120, top=60)
+    return styled(figure, height=360, left=120, top=60)
 
 
 def timeline(record: dict[str, Any], scheduler: str, fixed: str) -> go.Figure:
@@ -215,12 +215,13 @@ def timeline(record: dict[str, Any], scheduler: str, fixed: str) -> go.Figure:
     figure.update_xaxes(showgrid=False, zeroline=False)
     figure.update_xaxes(title="time in the drive, s", row=3)
     figure.update_layout(hovermode="x", legend=LEGEND | {"y": 1.07})
-    return _styled(figure, height=650, top=80)
+    return styled(figure, height=650, top=80)
 
 
-def _styled(
+def styled(
     figure: go.Figure, *, height: int, left: int = 70, top: int = 20, **layout: Any
 ) -> go.Figure:
+    """The figure in the page's font and colours, so many pixels high."""
     return figure.update_layout(
         template="none",
         font=FONT,

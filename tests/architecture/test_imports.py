@@ -33,6 +33,7 @@ room("unwrap.networks", *SIGNAL, "unwrap.depth")
 room("unwrap.networks.peers", *UNWRAPPING)
 room("unwrap.training", *UNWRAPPING)
 room("unwrap.recordings", *UNWRAPPING, "unwrap.pictures")
+room("unwrap.calibration", *SIGNAL, "unwrap.depth", "unwrap.recordings")
 room("unwrap.export", *UNWRAPPING, "unwrap.training")
 room("unwrap.comparison", *UNWRAPPING, "unwrap.training", "unwrap.pictures")
 room("unwrap", *UNWRAPPING)
@@ -108,7 +109,9 @@ room(
     "agents.evaluation",
     "agents.training",
 )
-room("agents.report", *PLAYING, "unwrap.pictures", "agents.evaluation")
+room(
+    "agents.report", *PLAYING, "unwrap.calibration", "unwrap.pictures", "agents.evaluation"
+)
 room("agents.deploy", *SIGNAL, "agents.policies")
 room("agents", "agents.policies", "agents.evaluation", "agents.training")
 room("agents.cli", *ROOMS)

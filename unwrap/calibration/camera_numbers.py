@@ -84,6 +84,10 @@ class Calibration:
     temperature_k : float or None
         Of the imager when offsets and distances were recorded.
     recordings : tuple of Moments
+    stretch : [P]
+        Radial distance of each pixel over that along the optical axis.
+    assumed : Assumed
+        What stood in where the recordings tell nothing.
     """
 
     numbers: dict[str, Estimate]
@@ -93,10 +97,12 @@ class Calibration:
     offset_lsb: Array | None
     temperature_k: float | None
     recordings: tuple[Moments, ...] = field(repr=False)
+    stretch: Array = field(repr=False)
+    assumed: Assumed
 
-    def value(self, name: str, otherwise: float) -> float:
+    def value(self, name: str) -> float:
         """The measured number, or the assumed one."""
-        return self.numbers[name].value if name in self.numbers else otherwise
+        return self.numbers[name].value if name in self.numbers else getattr(self.assumed, name)
 
 
 WHAT_TO_RECORD = {
@@ -120,7 +126,7 @@ WHAT_TO_RECORD = {
 }
 
 
-def calibrate(
+def calibrate_camera(
     recordings: Sequence[Moments], shape: tuple[int, int], stretch: Array, assumed: Assumed
 ) -> Calibration:
     """All that the recordings tell.
@@ -137,45 +143,51 @@ def calibrate(
         What stands in where they tell nothing.
     """
     generator = np.random.default_rng(SEED)
-    temperature = _calibration_temperature(recordings)
-    dark = _reference_dark(recordings, temperature)
-    estimates = jackknife(
-        partial(_pixel_numbers, recordings, shape, stretch, assumed, temperature),
-        shape[0] * shape[1],
-    )
+    temperature_k = _calibration_temperature(recordings)
+    numbers: dict[str, Estimate | None] = {
+        **jackknife(
+            partial(_pixel_numbers, recordings, shape, stretch, assumed, temperature_k),
+            shape[0] * shape[1],
+        )
+    }
+    dark = _reference_dark(recordings, temperature_k)
+    pattern_lsb = None
     if dark:
-        pattern, noise = offset_map(dark)
-        std, share = pattern_parts(pattern.reshape(shape), noise, generator)
-        estimates |= {"offset_std_lsb": std, "offset_row_share": share}
-    cold_and_warm = [
-        r for r in recordings if _is_dark(r) and r.setting.temperature_k is not None
-    ]
-    drifts = {"offset_drift_lsb_per_k": drift_of_pattern(cold_and_warm, generator)}
-    strength = estimates.get("harmonic_strength")
-    known = assumed.harmonic_strength if strength is None else strength.value
-    drifts["distance_drift_m_per_k"] = distance_drift(recordings, known, assumed)
-    estimates |= {name: found for name, found in drifts.items() if found is not None}
+        pattern, noise_lsb2 = offset_map(dark)
+        pattern_lsb = pattern.reshape(shape)
+        std, share = pattern_parts(pattern_lsb, noise_lsb2, generator)
+        numbers |= {"offset_std_lsb": std, "offset_row_share": share}
+    all_dark = [r for r in recordings if is_dark(r) and r.setting.temperature_k is not None]
+    numbers["offset_drift_lsb_per_k"] = drift_of_pattern(all_dark, generator)
+    strength = numbers.get("harmonic_strength")
+    points = drift_of_distance(
+        recordings, assumed.harmonic_strength if strength is None else strength.value, assumed
+    )
+    numbers["distance_drift_m_per_k"] = drift_per_kelvin(*points)
+    told = {name: number for name, number in numbers.items() if number is not None}
     return Calibration(
-        numbers=estimates,
-        leaning=_leaning(estimates, recordings),
-        missing={name: what for name, what in WHAT_TO_RECORD.items() if name not in estimates},
+        numbers=told,
+        leaning=_leaning(told, recordings),
+        missing={name: what for name, what in WHAT_TO_RECORD.items() if name not in told},
         tables=_tables(recordings, stretch, assumed),
-        offset_lsb=pattern.reshape(shape).astype(np.float32) if dark else None,
-        temperature_k=temperature,
+        offset_lsb=pattern_lsb,
+        temperature_k=temperature_k,
         recordings=tuple(recordings),
+        stretch=stretch,
+        assumed=assumed,
     )
 
 
-def distance_drift(
+def drift_of_distance(
     recordings: Sequence[Moments], strength: float, assumed: Assumed
-) -> Estimate | None:
-    """Drift of distance per kelvin by the recordings of a temperature run."""
+) -> tuple[Array, Array]:
+    """Temperatures of a temperature run, and how much farther than in the first, K and m."""
     warm = [r for r in recordings if r.setting.kind == "warm"]
+    kelvin = np.array([r.setting.temperature_k for r in warm], float)
     if not warm:
-        return None
+        return kelvin, kelvin
     light = [fundamentals(r.phasors, strength, assumed.highest_harmonic) for r in warm]
-    points = drift_points(light, assumed.frequencies_hz, [r.flagged for r in warm])
-    return drift_per_kelvin(np.array([r.setting.temperature_k for r in warm], float), points)
+    return kelvin, drift_points(light, assumed.frequencies_hz, [r.flagged for r in warm])
 
 
 def amplitudes_of(recording: Moments, strength: float, highest: int) -> Array:
@@ -206,38 +218,35 @@ def _pixel_numbers(
     found["gain_lsb_per_e"] = _or_assumed(gain, over_contrast * assumed.contrast)
     gain = _or_assumed(found["gain_lsb_per_e"], assumed.gain_lsb_per_e)
     contrast = _or_assumed(found["contrast"], assumed.contrast)
-    any_dark = any(_is_dark(r) for r in recordings)
     read_e = read_noise_e(dark_lsb2, gain)
-    found["read_noise_e"] = read_e if any_dark else np.nan
-
-    electrons = [ambient_e(r, gray) for r in chosen]
-    lit = [n for n, r in enumerate(chosen) if r.setting.kind != "dark"]
     dark = _reference_dark(chosen, temperature_k)
+    found["read_noise_e"] = read_e if dark else np.nan
+
     pattern = offset_map(dark)[0] if dark else None
-    found["full_well_e"] = np.nan
-    usable = [n for n in lit if np.isfinite(electrons[n]).all()]
-    taps = [
-        taps_e(
-            chosen[n],
-            chosen[n].offset_lsb if pattern is None else pattern,
-            amplitudes[n],
-            electrons[n],
-            gain,
-            contrast,
-        )
-        for n in usable
+    electrons = [ambient_e(r, gray) for r in chosen]
+    lit = [
+        (r, taps_e(r, r.offset_lsb if pattern is None else pattern, a, e, gain, contrast))
+        for r, a, e in zip(chosen, amplitudes, electrons, strict=True)
+        if r.setting.kind != "dark" and np.isfinite(e).all()
     ]
-    found["full_well_e"] = full_well_e([chosen[n] for n in usable], taps, read_e, assumed.bits)
+    found["full_well_e"] = full_well_e(*_columns(lit), read_e, assumed.bits)
+    ambient = [
+        (r, e)
+        for r, e in zip(chosen, electrons, strict=True)
+        if r.setting.kind == "dark" and has_electrons(r)
+    ]
     found["offset_ambient_lsb"] = np.nan
     if pattern is not None:
-        bright = [n for n, r in enumerate(chosen) if r.setting.kind == "dark" and has_electrons(r)]
         parity = np.where(pixels // shape[1] % 2 == 0, 1.0, -1.0)
-        slope = ambient_slope(
-            pattern, [chosen[n] for n in bright], [electrons[n] for n in bright], parity
-        )
-        well = _or_assumed(found["full_well_e"], assumed.full_well_e)
-        found["offset_ambient_lsb"] = slope * 2 * well
+        well_e = _or_assumed(found["full_well_e"], assumed.full_well_e)
+        # Of light that fills both taps.
+        slope = ambient_slope(pattern, *_columns(ambient), parity)
+        found["offset_ambient_lsb"] = slope * 2 * well_e
     return found
+
+
+def _columns(pairs: Sequence[tuple[Moments, Array]]) -> tuple[list[Moments], list[Array]]:
+    return [first for first, _ in pairs], [second for _, second in pairs]
 
 
 def _wall_numbers(
@@ -275,7 +284,7 @@ def _tables(
     }
 
 
-def _is_dark(recording: Moments) -> bool:
+def is_dark(recording: Moments) -> bool:
     """Laser off and no other light."""
     return recording.setting.kind == "dark" and not recording.setting.ambient
 
@@ -283,7 +292,7 @@ def _is_dark(recording: Moments) -> bool:
 def _calibration_temperature(recordings: Sequence[Moments]) -> float | None:
     """Temperature of the walls, or else of the first recording in the dark."""
     walls = [r for r in recordings if r.setting.kind == "wall"]
-    for group in (walls, [r for r in recordings if _is_dark(r)][:1]):
+    for group in (walls, [r for r in recordings if is_dark(r)][:1]):
         told = [r.setting.temperature_k for r in group]
         if told and None not in told:
             return float(np.mean(told))
@@ -292,7 +301,7 @@ def _calibration_temperature(recordings: Sequence[Moments]) -> float | None:
 
 def _reference_dark(recordings: Sequence[Moments], temperature_k: float | None) -> list[Moments]:
     """Recordings in the dark at the temperature nearest to that of the calibration."""
-    dark = [r for r in recordings if _is_dark(r)]
+    dark = [r for r in recordings if is_dark(r)]
     told = [r for r in dark if r.setting.temperature_k is not None]
     if not told:
         return dark

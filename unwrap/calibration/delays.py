@@ -21,13 +21,13 @@ def rad_per_m(frequencies_hz: Sequence[float]) -> Array:
     return 4 * np.pi * np.asarray(frequencies_hz) / SPEED_OF_LIGHT_M_S
 
 
-def wall_curves(
+def wall_phases(
     walls: Sequence[Moments], stretch: Array, frequencies_hz: Sequence[float]
-) -> Array:
-    """Coefficients of the phase error at each frequency, see `fit_wiggle`: [K, 7].
+) -> tuple[Array, Array, Array]:
+    """Decoded phases, those of the known distances, and the weights of N pixels of walls.
 
     Pixels count by their squared amplitude, the inverse of their phases' variance, and not at all
-    where a frame was saturated.
+    where a frame was saturated. All three are [K, N].
 
     Parameters
     ----------
@@ -37,12 +37,13 @@ def wall_curves(
     phasors = np.concatenate([wall.phasors for wall in walls], -1)
     true_m = np.concatenate([wall.setting.distance_m * stretch for wall in walls])
     frames = np.concatenate([wall.frames * (wall.flagged == 0) for wall in walls])
-    return np.stack(
-        [
-            fit_wiggle(np.angle(phasor), true_m * per_m, frames * np.abs(phasor) ** 2)
-            for phasor, per_m in zip(phasors, rad_per_m(frequencies_hz), strict=True)
-        ]
-    )
+    true_rad = rad_per_m(frequencies_hz)[:, None] * true_m
+    return np.angle(phasors), true_rad, frames * np.abs(phasors) ** 2
+
+
+def wall_curves(walls: Sequence[Moments], stretch: Array, frequencies_hz: Sequence[float]) -> Array:
+    """Coefficients of the phase error at each frequency [K, 7]; see `fit_wiggle`, `wall_phases`."""
+    return np.stack([*map(fit_wiggle, *wall_phases(walls, stretch, frequencies_hz))])
 
 
 def common_delay_m(delays_rad: Array, frequencies_hz: Sequence[float]) -> float:
@@ -66,9 +67,7 @@ def drift_points(
     flagged : [P] of each
     """
     usable = np.all([share == 0 for share in flagged], axis=0)
-    shifts = [
-        np.angle((phasors * light[0].conj())[:, usable].sum(-1)) for phasors in light
-    ]
+    shifts = [np.angle((phasors * light[0].conj())[:, usable].sum(-1)) for phasors in light]
     return np.array([common_delay_m(shift, frequencies_hz) for shift in shifts])
 
 

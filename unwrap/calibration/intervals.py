@@ -64,9 +64,7 @@ def student_quantile(probability: float, freedom: float) -> float:
     return z + sum(term / freedom**power for power, term in enumerate(terms, start=1))
 
 
-def jackknife(
-    numbers: Callable[[Array], Mapping[str, float]], pixels: int
-) -> dict[str, Estimate]:
+def jackknife(numbers: Callable[[Array], Mapping[str, float]], pixels: int) -> dict[str, Estimate]:
     """Every number of a function of pixels, its error by leaving out a twentieth of them in turn.
 
     Source: Efron and Stein, The Jackknife Estimate of Variance (1981), with groups in place of

@@ -78,9 +78,7 @@ def ambient_slope(
     return product / square if square > 0 else float("nan")
 
 
-def drift_of_pattern(
-    dark: Sequence[Moments], generator: np.random.Generator
-) -> Estimate | None:
+def drift_of_pattern(dark: Sequence[Moments], generator: np.random.Generator) -> Estimate | None:
     """Standard deviation of the offsets' change per kelvin, LSB/K; None of fewer than two.
 
     The slope of each pixel over temperature by least squares; the variance of the slopes, of which

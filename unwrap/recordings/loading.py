@@ -19,7 +19,12 @@ from unwrap.signal import ADC_BITS, Shots
 
 
 def load_recording(
-    path: Path, *, bits: int = ADC_BITS, gray: Path | None = None, offset: Path | None = None
+    path: Path,
+    *,
+    bits: int = ADC_BITS,
+    gray: Path | None = None,
+    offset: Path | None = None,
+    to_unwrap: bool = True,
 ) -> Recording:
     """Recording of a file or a folder, complete enough to be unwrapped.
 
@@ -33,6 +38,8 @@ def load_recording(
         Gray images, in place of those of the recording: `.npy`, `.npz` or a 16-bit `.png`.
     offset : Path, optional
         Dark-offset map, in place of the recording's: `.npy` or `.npz`.
+    to_unwrap : bool
+        False where it need not be complete, as of a dark scene.
 
     Raises
     ------
@@ -46,7 +53,7 @@ def load_recording(
         recording = with_offset(recording, _read_map(offset, "offset_lsb"), str(offset))
     shots = recording.raw.shots
     # Eight samples tell the wrap by their two frequencies; fewer need a network, which needs gray.
-    if recording.gray is None and shots != Shots.EIGHT:
+    if to_unwrap and recording.gray is None and shots != Shots.EIGHT:
         raise ValueError(
             f"{path}: {int(shots)} samples and no gray image; expected gray images beside them, in "
             "the recording or with --gray, or 8 samples"
