@@ -184,7 +184,7 @@ def bench(camera: Camera) -> list[tuple[dict, Scene, int]]:
         planned.append((known, Scene(slope_m, dark, light_e), 64))
     for share in (0.2, 0.6, 1.1, 1.25, 1.4, 1.6):
         known = {"kind": "still", **room, "laser_power_w": 5 * share}
-        planned.append((known, Scene(slope_m, share * most_e * (0.1 + 0.9 * across), dark), 64))
+        planned.append((known, Scene(slope_m, share * most_e * (0.1 + 0.9 * across), dark), 32))
     for wall_m in WALLS_M:
         # Light falls off towards the corners; power is set for each distance.
         light_e = 0.6 * most_e / camera.stretch**3
@@ -198,10 +198,10 @@ def bench(camera: Camera) -> list[tuple[dict, Scene, int]]:
     return planned
 
 
-def main(folder: Path, seed: int) -> None:
+def main(folder: Path, seed: int, **size: int) -> None:
     """Write the recordings, what is known of them and, beside them, the camera's hidden numbers."""
     folder.mkdir(parents=True, exist_ok=True)
-    camera = hidden_camera(seed)
+    camera = hidden_camera(seed, **size)
     rows = []
     for number, (known, scene, frames) in enumerate(bench(camera)):
         raw, gray, exposure_s = record(camera, scene, frames, number)

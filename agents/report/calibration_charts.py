@@ -157,8 +157,8 @@ def full_well_chart(found: Calibration) -> tuple[str, str, go.Figure] | None:
     figure.update_xaxes(title="charge of the fullest tap, thousands of electrons", **AXIS)
     figure.update_yaxes(title="share of frames saturated", range=[-0.05, 1.05], **AXIS)
     note = (
-        "The full well is where a tap is full in half of the frames. The band is its interval: the "
-        "gain that turns words into electrons is less certain than the edge itself."
+        "A tap that holds as much as the full well is full in half of the frames. The band is the "
+        "interval: the gain that turns words into electrons is less certain than the edge itself."
     )
     return "Full well", note, styled(figure, height=320)
 

@@ -12,7 +12,7 @@ from plotly.offline import get_plotlyjs
 from agents.report.calibration_charts import charts_of
 from agents.report.charts import figure_html
 from shotenv.config import SensorConfig
-from unwrap.calibration import CONFIDENCE, BenchConfig, Calibration, interval_text
+from unwrap.calibration import CONFIDENCE, BenchConfig, Calibration, interval_text, number_text
 from unwrap.support import write_text
 
 PAGE = "calibration.html.jinja"
@@ -101,7 +101,7 @@ def rows_of(
                 "title": title,
                 "name": name if name in units else "",
                 "unit": units.get(name, "m"),
-                "value": "" if number is None else f"{number.value:.5g}",
+                "value": "" if number is None else number_text(number),
                 "interval": "" if number is None else interval_text(number),
                 "base": "" if kind_value is None else f"{kind_value:g}",
                 "note": f"not written: {refused[name]}" if name in refused else note,

@@ -24,4 +24,8 @@ from .photon_transfer import (
     gray_gain as gray_gain,
     has_electrons as has_electrons,
 )
-from .sensor_file import interval_text as interval_text, sensor_text as sensor_text
+from .sensor_file import (
+    interval_text as interval_text,
+    number_text as number_text,
+    sensor_text as sensor_text,
+)

@@ -42,7 +42,7 @@ def wall_phases(
 
 
 def wall_curves(walls: Sequence[Moments], stretch: Array, frequencies_hz: Sequence[float]) -> Array:
-    """Coefficients of the phase error at each frequency [K, 7]; see `fit_wiggle`, `wall_phases`."""
+    """Coefficients of the phase error at each frequency [K, 9]; see `fit_wiggle`, `wall_phases`."""
     return np.stack([*map(fit_wiggle, *wall_phases(walls, stretch, frequencies_hz))])
 
 

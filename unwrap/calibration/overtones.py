@@ -15,15 +15,15 @@ import numpy as np
 from unwrap.signal import WiggleTable, harmonic_weights
 
 Array = np.ndarray
-TURNS = (4, 8, 12)
-"""Cycles of the wiggle in one period that a table keeps; the next are below 1e-3 rad."""
+TURNS = (4, 8, 12, 16)
+"""Cycles of the wiggle in one period that a table keeps; the next are below 2e-3 rad."""
 LEAST_COVERED = 12
 """Of 16 parts of a quarter period: how many must hold measurements for the curve to be told."""
 TABLE_BINS = 256
 STEPS = 16
 """Of the search for a strength: errors shrink by far more than half in each."""
 GRID = 3073
-"""Phases between which a factor is linear, to 1e-6."""
+"""Phases between which a factor is linear, to 5e-6."""
 
 
 def overtone_factor(phase_rad: Array, strength: float, highest: int) -> Array:

@@ -71,11 +71,11 @@ def interval_text(estimate: Estimate) -> str:
 def _header(name: str, base_name: str, calibration: Calibration) -> Iterator[str]:
     """What the marks mean, and what no field of the file can say."""
     percent = f"{100 * CONFIDENCE:g} %"
+    percent = f"{100 * CONFIDENCE:g} %"
     yield f"# {name}: [measured] by its own recordings, with {percent} intervals; what a number"
-    yield "# leans on and was not measured is named (given ...). Lines with other marks are those of"
-    yield f"# {base_name}, whose heading follows."
+    yield "# leans on and was not measured is named (given ...). Lines with other marks are those"
+    yield f"# of {base_name}, whose heading follows."
     delay = calibration.numbers.get("distance_offset_m")
     if delay is not None:
-        interval = interval_text(delay)
-        yield f"# Distances are {number_text(delay)} m too long [measured] {interval}: no field holds"
-        yield "# that; the measured wiggle tables take it away."
+        yield f"# Distances are {number_text(delay)} m too long [measured] {interval_text(delay)}:"
+        yield "# no field holds that; the measured wiggle tables take it away."
