@@ -92,10 +92,11 @@ PLACES = {
     "unwrap.networks.peers": Box(384, 594, 168, 194),
     "unwrap.depth": Box(612, 794, *MAIN),
     "unwrap.training": Box(802, 970, *MAIN),
-    "unwrap.comparison": Box(30, 210, *CELLAR),
-    "unwrap.export": Box(218, 440, *CELLAR),
-    "unwrap.pictures": Box(448, 640, *CELLAR),
-    "unwrap.support": Box(648, 970, *CELLAR),
+    "unwrap.calibration": Box(30, 210, *CELLAR),
+    "unwrap.comparison": Box(218, 390, *CELLAR),
+    "unwrap.export": Box(398, 570, *CELLAR),
+    "unwrap.pictures": Box(578, 740, *CELLAR),
+    "unwrap.support": Box(748, 970, *CELLAR),
 }
 """Where each room is drawn. Rooms on the frame's way touch the hallway of their floor."""
 

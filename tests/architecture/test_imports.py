@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-LONGEST_FILE, LARGEST_ROOM = 350, 13
+LONGEST_FILE, LARGEST_ROOM = 350, 14
 """Lines of a file; files of a room."""
 
 # What each room may import, besides itself: rooms further up in this table, by their doors.
@@ -109,9 +109,7 @@ room(
     "agents.evaluation",
     "agents.training",
 )
-room(
-    "agents.report", *PLAYING, "unwrap.calibration", "unwrap.pictures", "agents.evaluation"
-)
+room("agents.report", *PLAYING, "unwrap.calibration", "unwrap.pictures", "agents.evaluation")
 room("agents.deploy", *SIGNAL, "agents.policies")
 room("agents", "agents.policies", "agents.evaluation", "agents.training")
 room("agents.cli", *ROOMS)

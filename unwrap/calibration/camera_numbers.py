@@ -8,6 +8,12 @@ from functools import partial
 
 import numpy as np
 
+from unwrap.calibration.dark_offsets import (
+    ambient_slope,
+    drift_of_pattern,
+    offset_map,
+    pattern_parts,
+)
 from unwrap.calibration.delays import (
     common_delay_m,
     drift_per_kelvin,
@@ -18,12 +24,6 @@ from unwrap.calibration.delays import (
 from unwrap.calibration.full_well import full_well_e, taps_e
 from unwrap.calibration.intervals import Estimate, jackknife
 from unwrap.calibration.moments import Moments
-from unwrap.calibration.offsets import (
-    ambient_slope,
-    drift_of_pattern,
-    offset_map,
-    pattern_parts,
-)
 from unwrap.calibration.overtones import fundamentals, strength_of, table_of
 from unwrap.calibration.photon_transfer import (
     ambient_e,

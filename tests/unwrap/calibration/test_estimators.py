@@ -7,6 +7,12 @@ import pytest
 import torch
 from scipy import stats
 
+from unwrap.calibration.dark_offsets import (
+    ambient_slope,
+    drift_of_pattern,
+    offset_map,
+    pattern_parts,
+)
 from unwrap.calibration.delays import common_delay_m, drift_per_kelvin, rad_per_m
 from unwrap.calibration.full_well import full_well_e
 from unwrap.calibration.intervals import (
@@ -19,12 +25,6 @@ from unwrap.calibration.intervals import (
     variance_draws,
 )
 from unwrap.calibration.moments import Moments, Setting, moments_of
-from unwrap.calibration.offsets import (
-    ambient_slope,
-    drift_of_pattern,
-    offset_map,
-    pattern_parts,
-)
 from unwrap.calibration.overtones import (
     fit_wiggle,
     fundamentals,
