@@ -1,4 +1,4 @@
-"""A camera's own numbers from its recordings: noise, offsets, overtones, delays, full well.
+"""A camera's own numbers, by its recordings.
 
     BenchRecording    frames of one recording, and what is known of it
     moments_of        its mean, temporal variance and flags by pixel, which all that follows needs

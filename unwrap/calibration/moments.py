@@ -118,11 +118,12 @@ def moments_of(
         raise ValueError(f"{setting.name}: {count} samples a frequency; expected 4")
     samples = samples_lsb.reshape(frames, frequencies, 4, -1)
     mean, variance = _mean_and_variance(samples)
-    gray = (None, None)
-    if gray_words is not None:
-        gray = _mean_and_variance(gray_words.reshape(frames, -1))
     flagged = saturated.reshape(frames, -1).mean(0)
-    return Moments(setting, frames, mean, variance.mean(1), flagged, *gray)
+    found = Moments(setting, frames, mean, variance.mean(1), flagged)
+    if gray_words is None:
+        return found
+    gray_mean, gray_variance = _mean_and_variance(gray_words.reshape(frames, -1))
+    return replace(found, gray_mean=gray_mean, gray_variance=gray_variance)
 
 
 def _mean_and_variance(values: Array) -> tuple[Array, Array]:

@@ -53,7 +53,7 @@ def gray_gain(recordings: Sequence[Moments]) -> float:
         return float("nan")
     mean = np.concatenate([r.gray_mean for r in lit])
     variance = np.concatenate([r.gray_variance for r in lit])
-    freedom = np.concatenate([np.full(len(r.gray_mean), r.frames - 1.0) for r in lit])
+    freedom = np.concatenate([np.full(r.flagged.shape, r.frames - 1.0) for r in lit])
     return float(variance_fit(np.stack((mean, np.ones_like(mean)), -1), variance, freedom)[0])
 
 
@@ -69,12 +69,12 @@ def ambient_e(recording: Moments, gray_lsb_per_e: float) -> Array:
 
     Those of the gray image, scaled from its exposure to the integration time.
     """
-    if not recording.setting.ambient:
+    setting, gray = recording.setting, recording.gray_mean
+    if not setting.ambient:
         return np.zeros(recording.flagged.shape)
-    if not has_electrons(recording):
+    if gray is None or setting.integration_s is None or setting.gray_exposure_s is None:
         return np.full(recording.flagged.shape, np.nan)
-    times = recording.setting.integration_s / recording.setting.gray_exposure_s
-    return recording.gray_mean * (times / gray_lsb_per_e)
+    return gray * (setting.integration_s / setting.gray_exposure_s / gray_lsb_per_e)
 
 
 def transfer_points(
@@ -93,7 +93,7 @@ def transfer_points(
         Amplitude in LSB, ambient electrons, 1.
     variance, freedom : [N]
     """
-    columns, variances, freedoms = [], [], []
+    columns, variances, freedoms = [np.zeros((0, 3))], [np.zeros(0)], [np.zeros(0)]
     for recording, amplitude in zip(recordings, amplitudes, strict=True):
         if recording.frames < LEAST_FRAMES:
             continue
@@ -104,7 +104,7 @@ def transfer_points(
         variances.append(recording.variance_lsb2[used])
         # Four samples at one frequency are averaged.
         freedoms.append(one * (4 * (recording.frames - 1)))
-    return tuple(map(np.concatenate, (columns, variances, freedoms)))
+    return np.concatenate(columns), np.concatenate(variances), np.concatenate(freedoms)
 
 
 def photon_transfer(columns: Array, variance: Array, freedom: Array) -> tuple[float, float, float]:
@@ -117,8 +117,10 @@ def photon_transfer(columns: Array, variance: Array, freedom: Array) -> tuple[fl
     gain_over_contrast, gain, dark_lsb2 : float
         g / m and g in LSB per electron, V_dark in LSB^2; NaN where no light tells it.
     """
-    lit = columns.max(0) > 0
+    lit = columns.max(0, initial=0.0) > 0
     found = np.full(3, np.nan)
+    if not lit.any():
+        return np.nan, np.nan, np.nan
     found[lit] = variance_fit(columns[:, lit], variance, freedom)
     over_contrast, gain_squared, dark = found
     return float(over_contrast), float(np.sqrt(max(gain_squared, 0.0))) if lit[1] else np.nan, dark

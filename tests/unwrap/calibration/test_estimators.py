@@ -124,6 +124,9 @@ def test_without_ambient_light_only_gain_over_contrast_is_told():
     found = photon_transfer(columns, 2.0 + 0.5 * np.arange(100.0), np.full(100, 9.0))
     assert found[0] == pytest.approx(0.5) and np.isnan(found[1]) and found[2] == pytest.approx(2.0)
     assert np.isnan(gray_gain([recording(LIT, np.zeros((1, 4, 3)))]))
+    # Ambient light that no gray image counts tells nothing at all.
+    unknown = recording(Setting("still", ambient=True), np.ones((1, 4, 3)))
+    assert np.isnan(photon_transfer(*transfer_points([unknown], [np.ones((1, 3))], np.nan))).all()
 
 
 def test_small_measured_variances_do_not_count_more_than_others():
