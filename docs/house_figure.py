@@ -95,6 +95,7 @@ PLACES = {
     "unwrap.depth": Box(632, 800, *MAIN),
     "unwrap.training": Box(808, 970, *MAIN),
     "unwrap.ros": Box(30, 130, *CELLAR),
+    "unwrap.calibration": Box(138, 290, *CELLAR),
     "unwrap.comparison": Box(298, 460, *CELLAR),
     "unwrap.export": Box(468, 620, *CELLAR),
     "unwrap.pictures": Box(628, 748, *CELLAR),

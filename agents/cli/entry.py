@@ -15,6 +15,7 @@ from jsonargparse import ArgumentError, Namespace
 
 from agents.cli import (
     bank_commands,
+    camera_calibrate_command,
     camera_commands,
     collect_command,
     doctor,
@@ -38,6 +39,7 @@ COMMANDS: tuple[Command, ...] = (
     *bank_commands.COMMANDS,
     *unwrap_commands.COMMANDS,
     *camera_commands.COMMANDS,
+    *camera_calibrate_command.COMMANDS,
 )
 
 

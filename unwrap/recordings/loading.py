@@ -39,7 +39,8 @@ def load_recording(
     offset : Path, optional
         Dark-offset map, in place of the recording's: `.npy` or `.npz`.
     unwrapped : bool
-        Whether a network is to unwrap it; the wrapped distance needs no gray image.
+        Whether a network is to unwrap it; the wrapped distance needs no gray image,
+        and a dark scene has none.
 
     Raises
     ------
