@@ -60,7 +60,7 @@ FLOORS = {
 # Lower and upper edges of the rows of rooms.
 TOP = (736, 852)
 BACK, FRONT = (530, 644), (412, 522)
-MAIN, CELLAR = (160, 298), (67, 152)
+MAIN, CELLAR = (174, 298), (67, 166)
 PLACES = {
     "agents.cli": Box(374, 626, 900, 954),
     "agents.report": Box(30, 120, *TOP),
@@ -87,11 +87,11 @@ PLACES = {
     "shotenv.decision": Box(658, 818, *FRONT),
     "shotenv.env": Box(826, 950, FRONT[0], BACK[1]),
     "unwrap.cameras": Box(30, 144, *MAIN),
-    "unwrap.cameras.files": Box(40, 134, 168, 194),
+    "unwrap.cameras.files": Box(40, 134, 179, 202),
     "unwrap.recordings": Box(152, 272, *MAIN),
     "unwrap.signal": Box(280, 412, *MAIN),
     "unwrap.networks": Box(420, 624, *MAIN),
-    "unwrap.networks.peers": Box(430, 614, 168, 194),
+    "unwrap.networks.peers": Box(430, 614, 179, 202),
     "unwrap.depth": Box(632, 800, *MAIN),
     "unwrap.training": Box(808, 970, *MAIN),
     "unwrap.ros": Box(30, 130, *CELLAR),

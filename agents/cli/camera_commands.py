@@ -151,7 +151,8 @@ def correct_camera_files(arguments: Namespace) -> int:
         noise_lsb=arguments.noise_lsb,
     )
     network = None
-    if unwrapper is not None and first.gray is not None:
+    # Three frequencies need none.
+    if unwrapper is not None and first.gray is not None and len(first.frequencies_hz) < 3:
         network = load_unwrapper(unwrapper)
         if (warning := frequency_warning(network, sensor, recording.size)) is not None:
             say(f"warning: {warning}")

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from unwrap.cameras.camera_frames import CameraFrames
 from unwrap.cameras.files import CameraDescription
 from unwrap.cameras.pixel_rays import rays_of
+from unwrap.cameras.three_frequencies import unwrap_three
 from unwrap.depth import Eight, Merge
 from unwrap.networks import Unwrapper
 from unwrap.recordings import (
@@ -17,11 +21,30 @@ from unwrap.recordings import (
     require_gray,
     with_stored_offset,
 )
-from unwrap.signal import SensorDescription, candidate_spacing_m, unambiguous_range_m
+from unwrap.signal import SensorDescription, unambiguous_range_m
 
 AGREEING_SHARE = 0.4
-"""Disagreement of two frequencies that is still trusted, in distances from one candidate to the
-next: 0.5 is the most there is. As 1 m is of the 2.5 m of 24 and 10 MHz."""
+"""Disagreement of frequencies that is still trusted, over the least one of a wrong candidate: with
+two 0.5 is the most there is. As 1 m is of the 2.5 m of 24 and 10 MHz."""
+
+
+def least_disagreement_m(frequencies_hz: Sequence[float], max_range_m: float) -> float:
+    """How far the frequencies are apart, metres, at the wrong candidate where they agree best.
+
+    Examples
+    --------
+    >>> round(least_disagreement_m((24e6, 10e6), 25.0), 2)
+    2.5
+    >>> round(least_disagreement_m((120e6, 80e6, 16e6), 18.7), 2)
+    0.62
+    """
+    first_m, *others_m = map(unambiguous_range_m, frequencies_hz)
+    found = [min(others_m)]  # No wrong candidate within the range: none is further than this.
+    for n in range(1, math.floor(max_range_m / first_m) + 1):
+        # What is left over the nearest whole wrap of each; at the first frequency it is zero.
+        apart_m = [0.0, *(math.remainder(n * first_m, range_m) for range_m in others_m)]
+        found.append(max(apart_m) - min(apart_m))
+    return min(found)
 
 
 def sensor_of(
@@ -34,19 +57,19 @@ def sensor_of(
     Parameters
     ----------
     frequencies_hz : tuple of float
-        Of the frames, descending; of three the first alone counts, at which they stay wrapped.
+        Of the frames, descending.
     unwrapped : bool
         Whether a network unwraps samples of one frequency.
     """
     first_hz, range_m, agreeing_m = frequencies_hz[0], unambiguous_range_m(frequencies_hz[0]), 0.0
-    second_hz = frequencies_hz[1] if len(frequencies_hz) == 2 else first_hz
-    if second_hz == first_hz and unwrapped:
-        range_m = camera.max_range_m or SensorDescription.max_range_m
-    if second_hz != first_hz:
+    second_hz = first_hz if len(frequencies_hz) == 1 else frequencies_hz[1]
+    if len(frequencies_hz) > 1:
         range_m = camera.range_m
         # A hair less than the joint range, at whose end the first candidate comes again.
-        spacing_m = candidate_spacing_m(first_hz, second_hz, range_m * (1 - 1e-6))
-        agreeing_m = AGREEING_SHARE * spacing_m
+        apart_m = least_disagreement_m(frequencies_hz, range_m * (1 - 1e-6))
+        agreeing_m = AGREEING_SHARE * apart_m
+    elif unwrapped:
+        range_m = camera.max_range_m or SensorDescription.max_range_m
     return SensorDescription(
         f1_hz=first_hz,
         f2_hz=second_hz,  # Of one frequency alone it is never asked for.
@@ -108,7 +131,7 @@ def correct_frames(
     offset: Path | None = None,
     network: Unwrapper | None = None,
 ) -> list[CorrectedFrame]:
-    """Depth of frames at one or two frequencies; without a network of three, the wrapped distance.
+    """Depth of frames; two and three frequencies unwrap each other, three without any network.
 
     Parameters
     ----------
@@ -122,18 +145,18 @@ def correct_frames(
     Raises
     ------
     ValueError
-        Three frequencies that are to be unwrapped; samples that tell no noise, where none is told;
-        or what `correct_recording` refuses.
+        Three frequencies with wiggle tables, or for a network; samples that tell no noise, where
+        none is told; or what `correct_recording` refuses.
     """
-    # Here three frequencies are unwrapped, once there is a function that does it.
-    if len(frames.frequencies_hz) > 2:
-        if settings.unwrapper is not None:
+    three = len(frames.frequencies_hz) > 2
+    if three:
+        if settings.description.wiggle is not None or settings.eight == "network":
             raise ValueError(
-                f"{where}: three frequencies are not unwrapped together yet; expected --unwrapper "
-                f"none, for the wrapped distance at {frames.frequencies_hz[0] / 1e6:g} MHz"
+                f"{where}: three frequencies are unwrapped without wiggle tables and networks; "
+                "expected no --wiggle, and --eight two_frequency or kernel_density"
             )
-        frames = frames.at_highest_frequency()
-    recording = frames.recording()
+        settings = replace(settings, unwrapper=None)
+    recording = (frames.at_highest_frequency() if three else frames).recording()
     if offset is not None:
         recording = with_stored_offset(recording, offset)
     if settings.unwrapper is not None:
@@ -144,4 +167,5 @@ def correct_frames(
             f"{where}: such samples do not tell their noise, and without it noise passes as "
             f"signal; expected --noise-lsb, or noise_lsb in the description of {camera.name}"
         )
-    return correct_recording(recording, settings, network)
+    corrected = correct_recording(recording, settings, network)
+    return unwrap_three(frames, corrected, settings) if three else corrected

@@ -8,6 +8,7 @@ from .depth_output import (
 from .frame_correction import (
     CorrectedFrame as CorrectedFrame,
     correct_recording as correct_recording,
+    require_valid as require_valid,
 )
 from .images import read_png_folder as read_png_folder
 from .loading import (

@@ -97,7 +97,7 @@ def correct_recording(
                 offset_lsb=one.offset_lsb,
                 noise_lsb=noise.noise_lsb,
             )
-        _require_valid(one, depth)
+        require_valid(one, depth)
         confidence = None if prediction is None else prediction.confidence
         frames.append(CorrectedFrame(one, depth, confidence, noise))
     return frames
@@ -121,7 +121,8 @@ def wrapped_frame(one: Recording, noise_lsb: Tensor, sensor: SensorDescription) 
     )
 
 
-def _require_valid(one: Recording, depth: DepthFrame) -> None:
+def require_valid(one: Recording, depth: DepthFrame) -> None:
+    """Raise `NoUsablePixelError` where no pixel of one frame is valid."""
     if not bool(depth.valid.any()):
         saturated, pixels = int(one.raw.saturated.sum()), one.raw.saturated.numel()
         frame = f" in frame {one.names[0]}" if one.names[0] else ""

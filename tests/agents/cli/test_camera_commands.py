@@ -103,7 +103,7 @@ def written(tmp_path, name, *, still=False):
         ("phasor_video", unambiguous_range_m(30e6)),
         ("imx556", 1e3),
         ("arducam_b0548", 1e3),
-        ("kinect_v2_dump", unambiguous_range_m(120e6)),
+        ("kinect_v2_dump", 1e3),
     ],
 )
 def test_every_camera_goes_through_describe_and_correct(
@@ -117,7 +117,7 @@ def test_every_camera_goes_through_describe_and_correct(
     assert "2 frames of 12 x 16" in out.splitlines()[0]
     assert any(way["described"] and way["fits"] for way in found["labellings"])
     path, camera, walls = written(tmp_path, name)
-    # Without a network: one frequency and three stay wrapped, two unwrap each other.
+    # Without a network: one frequency stays wrapped, two and three unwrap each other.
     _, err = correct(path, "--camera", camera, "--unwrapper", "none")
     assert "warning" not in err
     for frame, wall in enumerate(walls):
@@ -137,7 +137,7 @@ def test_kinect_logs_at_full_size(correct, tmp_path):
     folder = tmp_path / "out" / "Frame_0"
     valid = depth_of(folder, "valid.npy")
     assert not valid[:, [0, -1]].any() and valid[:, 1:-1].all()
-    assert off(depth_of(folder), wall, unambiguous_range_m(120e6))[valid].max() < 5e-3
+    assert np.abs(depth_of(folder) - wall)[valid].max() < 5e-3
     points = np.asarray(trimesh.load(folder / "points.ply").vertices)
     assert len(points) == valid.sum()
 
@@ -251,11 +251,59 @@ def test_plain_recordings_need_no_network_for_the_wrapped_distance(correct, tmp_
     assert "there is no network" in correct(tmp_path / "a.npy", *words, status=1)
 
 
-def test_three_frequencies_are_not_unwrapped_yet_and_it_says_so(correct, tmp_path):
-    path, camera, _ = written(tmp_path, "kinect_v2_dump")
-    told = correct(path, "--camera", camera, status=1)
-    assert "three frequencies are not unwrapped together yet; expected --unwrapper none" in told
-    assert not (tmp_path / "out").exists()
+@pytest.mark.parametrize("way", ["two_frequency", "kernel_density"])
+def test_three_frequencies_unwrap_over_their_joint_range(correct, tmp_path, way):
+    hz = [80e6, 16e6, 120e6]
+    # Up to the end of the joint range, 18.74 m, fourteen wraps of 120 MHz; neighbours that vote
+    # must see nearly the same distance.
+    ramp_m = np.linspace(0.5, 18.2, HEIGHT * WIDTH).reshape(HEIGHT, WIDTH)
+    if way == "kernel_density":
+        ramp_m = 17.0 + SLOPE_M
+    stored = whole(planes("kinect_v2", [ramp_m], hz, amplitude=4000, noise=20)).reshape(9, -1)
+    if way == "two_frequency":
+        stored[3:6, 5] = 0  # No signal at 16 MHz alone.
+    stored.T.astype("<i4").tofile(tmp_path / "recording")
+    camera = small_camera(
+        tmp_path,
+        "kinect_v2_dump",
+        layout={"height": HEIGHT, "width": WIDTH},
+        lens={"center_px": [7.5, 5.5], "radial": [0, 0, 0]},
+    )
+    words = (tmp_path / "recording", "--camera", camera, "--eight", way)
+    correct(*words)
+    folder = tmp_path / "out/00000"
+    valid, depth_m = depth_of(folder, "valid.npy"), depth_of(folder)
+    np.testing.assert_allclose(depth_m[valid], ramp_m[valid], atol=0.02)
+    if way == "two_frequency":
+        assert valid.sum() == valid.size - 1 and not valid[0, 5] and np.isnan(depth_m[0, 5])
+    else:
+        assert valid.all()
+    told = correct(*words[:3], "--eight", "network", "--overwrite", status=1)
+    assert "three frequencies are unwrapped without wiggle tables and networks" in told
+
+
+def test_points_and_log_have_the_lens_and_the_stored_times(correct, tmp_path):
+    from mcap.reader import make_reader
+    from rosbags.typesys import Stores, get_typestore
+
+    stored = whole(planes("epc660", [2 + SLOPE_M] * 2, [24e6]))[:, 0]
+    write_espros(tmp_path / "a.h5", stored, times=[5.0, 5.25])
+    lens = {"horizontal_fov_deg": None, "focal_px": [10.0, 10.0], "center_px": [0.0, 0.0]}
+    camera = small_camera(tmp_path, "epc660_hdf5", lens=lens)
+    words = (tmp_path / "a.h5", "--camera", camera, "--unwrapper", "none", "--points", "pcd")
+    correct(*words, "--mcap", tmp_path / "a.mcap")
+    assert (tmp_path / "out/00001/points.pcd").is_file()
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    with (tmp_path / "a.mcap").open("rb") as file:
+        messages = list(make_reader(file).iter_messages(topics=["/camera/depth/points"]))
+    times_ns = [message.log_time for *_, message in messages]
+    assert times_ns[1] - times_ns[0] == 250_000_000
+    content = store.deserialize_cdr(messages[0][2].data, "sensor_msgs/msg/PointCloud2").data
+    cloud = np.asarray(content).view("<f4").reshape(HEIGHT, WIDTH, 4)
+    # The principal point is the first pixel: it looks straight ahead, and all others right of it.
+    np.testing.assert_allclose(cloud[0, 0, :3], [2.0, 0.0, 0.0], atol=2e-3)
+    np.testing.assert_allclose(cloud[0, :, 1] / cloud[0, :, 0], -np.arange(WIDTH) / 10, atol=1e-5)
+    assert "stands already" in correct(*words, "--mcap", tmp_path / "a.mcap", status=1)
 
 
 def test_samples_that_tell_no_noise_need_it_told(correct, tmp_path):
