@@ -53,15 +53,14 @@ def page(found: dict[str, Any], picture: str, command: str) -> str:
 
 LEGEND: Final = """Every policy plays the same drives with the same noise, once at each price of
 power. *Gap closed*: 0 is the best mixture that looks at nothing, 1 the optimum that knows all, at
-the same energy, averaged over .3 to .9 of the energy of 8 DCS in every frame. *Energy at equal
-error* is that at which a policy errs as little as 8 DCS in every frame with a laser that never
-trips, as a share of its energy; 100 % where it is never as good. Any front may be mixed with
-choices that look at nothing. A row is the interquartile mean over its training seeds (of 5 the
-middle 3); brackets are {confidence} intervals that resample seeds and, in common for all, clips;
-*of its seeds* are the best and the worst. *The first does better*: probability that the row at the
-top has a higher return on a clip, over clips and pairs of seeds ([Agarwal et al.
-2021](https://arxiv.org/abs/2108.13264)). What is at the top is there by the drives that are shown,
-which favours it. `ridge` is a linear regression on the frames that the regression learns from, and
+the same energy, averaged over .3 to .9 of the energy of 8 DCS in every frame. *Energy saved* is
+that of 8 DCS asked for in every frame of the same drives, at its error and at 10 % more. Any front
+may be mixed with choices that look at nothing. A row is the interquartile mean over its training
+seeds (of 5 the middle 3); brackets are {confidence} intervals that resample seeds and, in common
+for all, clips; *of its seeds* are the best and the worst. *Does better*: probability that the best
+row that is no ablation has a higher return on a clip, over clips and pairs of seeds ([Agarwal et
+al. 2021](https://arxiv.org/abs/2108.13264)). It is the best by the drives that are shown, which
+favours it. `ridge` is a linear regression on the frames that the regression learns from, and
 `random` draws from all three actions: what a learned policy must beat. Rules are tuned on
 validation drives at each price."""
 

@@ -112,15 +112,16 @@ def measures_of(
 
 
 def main_measures(mixed: Front, against: References, weight: np.ndarray) -> Measures:
-    """Energy at equal error, error at half the energy, and the gap that is closed.
+    """Energy saved at equal and 10 % more error, error at half the energy, the gap that is closed.
 
     Of a front that was mixed with blind choices; without an optimum there is no gap.
     """
     at_half_m, *compared_m = mixed.error_at(np.concatenate(([HALF], COMPARED)), weight)
-    found = {
-        "energy_at_equal_error": mixed.energy_at(against.cool_eight_m, weight),
-        "error_at_half_energy": float(at_half_m),
-    }
+    found = {"error_at_half_energy": float(at_half_m)}
+    energy, _ = mixed.means(weight)
+    for at in ("at_equal_error", "at_10_percent_more"):
+        shares = mixed.mixture_at(ALLOWED[at] * against.always_eight_m, weight)
+        found[f"energy_saved_{at}"] = 1.0 - shares @ energy / against.always_eight_energy
     if not np.isnan(against.optimum_m).any():
         found["gap_closed"] = gap_closed(np.array(compared_m), against.blind_m, against.optimum_m)
     return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
@@ -33,7 +33,8 @@ def make_leaderboard(plan: StudyPlan, jobs: Sequence[Job], folder: Path) -> dict
     """
     tables, seconds = {}, 0.0
     for name in dict.fromkeys(job.table for job in jobs):
-        tables[name], took = _table([job for job in jobs if job.table == name], folder)
+        of_table = [job for job in jobs if job.table == name]
+        tables[name], took = _table(of_table, folder, set(plan.ablations))
         seconds += took
     elsewhere = plan.transfer.tables if plan.transfer else {}
     return {
@@ -45,7 +46,7 @@ def make_leaderboard(plan: StudyPlan, jobs: Sequence[Job], folder: Path) -> dict
     }
 
 
-def _table(jobs: Sequence[Job], folder: Path) -> tuple[dict[str, Any], float]:
+def _table(jobs: Sequence[Job], folder: Path, ablations: Set[str]) -> tuple[dict[str, Any], float]:
     """One table's rows, and the seconds that its jobs took."""
     results = {job.name: read_result(folder / job.name) for job in jobs}
     config, measured_by = next(
@@ -66,7 +67,9 @@ def _table(jobs: Sequence[Job], folder: Path) -> tuple[dict[str, Any], float]:
     name = jobs[0].table
     resampled = fronts.resampled(config.study, name)
     told = resampled.rows()
-    best = min(told, key=lambda row: told[row][RANKED_BY]["iqm"])
+    # What is not shown all is there to be compared, and not to be used.
+    ranked = [row for row in told if row not in ablations] or list(told)
+    best = min(ranked, key=lambda row: told[row][RANKED_BY]["iqm"])
     table = {
         "bank": bank_of(config.env),
         "env": config.env.model_dump(mode="json"),
@@ -75,6 +78,7 @@ def _table(jobs: Sequence[Job], folder: Path) -> tuple[dict[str, Any], float]:
         "clips": len(fronts.frames),
         "drives": config.study.drives,
         "kinds": kinds,
+        "ablations": sorted(ablations & set(kinds)),
         "best": best,
         "rows": told,
         "differences": resampled.differences(best),

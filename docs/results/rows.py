@@ -37,8 +37,9 @@ def rows_of(table: dict[str, Any]) -> list[str]:
 
 
 def best_of(table: dict[str, Any], kinds: Iterable[str]) -> list[str]:
-    """The best row of these kinds, if there is one."""
-    return [name for name in rows_of(table) if table["kinds"][name] in kinds][:1]
+    """The best row of these kinds, if there is one; ablations do not count."""
+    rows = [name for name in rows_of(table) if name not in table["ablations"]]
+    return [name for name in rows if table["kinds"][name] in kinds][:1]
 
 
 def rivals(table: dict[str, Any]) -> list[str]:
@@ -84,8 +85,9 @@ def leaderboard(preset: str, table: dict[str, Any]) -> str:
     """A preset and its table."""
     lines = [
         "| policy | seeds | gap closed | error at half the energy | of its seeds | "
-        "energy at equal error | return | the first does better |",
-        "|---|---|---|---|---|---|---|---|",
+        "energy saved, same error | with 10 % more | return | "
+        f"*{named(table['best'])}* does better |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for name in rows_of(table):
         row = table["rows"][name]
@@ -94,7 +96,9 @@ def leaderboard(preset: str, table: dict[str, Any]) -> str:
         lines.append(
             f"| {named(name)} | {len(seeds)} | {interval(row, 'gap_closed', '%')} | "
             f"{interval(row, AT_HALF, 'm')} | {spread} | "
-            f"{interval(row, 'energy_at_equal_error', '%')} | {interval(row, 'return', '')} | "
+            f"{interval(row, 'energy_saved_at_equal_error', '%')} | "
+            f"{interval(row, 'energy_saved_at_10_percent_more', '%')} | "
+            f"{interval(row, 'return', '')} | "
             f"{improvement(table, name)} |"
         )
     env = table["env"]

@@ -27,7 +27,10 @@ def script():
 
 def row(value, *, gap=True):
     told = {"iqm": value, "low": value - 0.1, "high": value + 0.1, "mean": value, "median": value}
-    names = ("error_at_half_energy", "energy_at_equal_error", "return")
+    names = (
+        *("error_at_half_energy", "energy_saved_at_equal_error"),
+        *("energy_saved_at_10_percent_more", "return"),
+    )
     names = (*names, "depth_mae_m", "laser_energy_share")
     seeds = [value - 0.02, *[value] * 3, value + 0.02]
     return {name: {**told, "seeds": seeds} for name in (*names, *["gap_closed"][: int(gap)])}
@@ -46,11 +49,18 @@ def found(seeds):
     table = {
         "bank": "0123456789abcdef",
         "env": {"bank": "pocket", "frames_per_drive": 256},
-        **{"price": 0.09, "clips": 30, "drives": 24, "best": "regression"},
+        **{
+            "price": 0.09,
+            "clips": 30,
+            "drives": 24,
+            "best": "regression",
+            "ablations": ["no_gray"],
+        },
         "rows": {"cycle": row(0.9, gap=False), "ridge": row(0.6), "regression": row(0.5)},
         "kinds": {"cycle": "rule", "ridge": "learned", "regression": "learned"},
-        "improvement": {"regression": {"ridge": even, "cycle": beside}},
+        "improvement": {"regression": {"ridge": even, "cycle": beside, "no_heat": even}},
         "differences": {
+            "no_heat": {"error_at_half_energy": difference(0.05, significant=False)},
             "ridge": {"error_at_half_energy": difference(-0.1, significant=False)},
             "cycle": {"error_at_half_energy": difference(-0.4, significant=True)},
         },
@@ -103,6 +113,7 @@ def test_the_page_ranks_rows_and_says_where_there_is_no_difference(script):
     assert "*greedy*: regression with `regression.horizon` 1" in text
     assert "0.50 m (0.40 to 0.60) | 0.48 to 0.52 m |" in text, "spread of the seeds"
     assert "only show that the study works" not in text
+    assert text.startswith("# Results\n\nOn `hot`, **regression**") and "than no heat" not in text
 
 
 def test_the_page_of_few_seeds_says_that_it_does_not_count(script):
