@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
@@ -218,7 +220,7 @@ def wiggle_chart(found: Calibration) -> tuple[str, str, go.Figure] | None:
     figure = make_subplots(rows=1, cols=len(curves), horizontal_spacing=0.14)
     grid = np.linspace(0, 2 * np.pi, 361)
     for k, (decoded, true, weight) in enumerate(zip(*phases, strict=True)):
-        place = {"row": 1, "col": k + 1, "again": k > 0}
+        place: dict[str, Any] = {"row": 1, "col": k + 1, "again": k > 0}
         to_mm = 1e3 / rad_per_m(assumed.frequencies_hz)[k]
         used = weight > 0
         difference = decoded[used] - true[used]

@@ -293,8 +293,8 @@ def _calibration_temperature(recordings: Sequence[Moments]) -> float | None:
     """Temperature of the walls, or else of the first recording in the dark."""
     walls = [r for r in recordings if r.setting.kind == "wall"]
     for group in (walls, [r for r in recordings if is_dark(r)][:1]):
-        told = [r.setting.temperature_k for r in group]
-        if told and None not in told:
+        told = [k for r in group if (k := r.setting.temperature_k) is not None]
+        if told and len(told) == len(group):
             return float(np.mean(told))
     return None
 
@@ -302,12 +302,12 @@ def _calibration_temperature(recordings: Sequence[Moments]) -> float | None:
 def _reference_dark(recordings: Sequence[Moments], temperature_k: float | None) -> list[Moments]:
     """Recordings in the dark at the temperature nearest to that of the calibration."""
     dark = [r for r in recordings if is_dark(r)]
-    told = [r for r in dark if r.setting.temperature_k is not None]
+    told = [(r, k) for r in dark if (k := r.setting.temperature_k) is not None]
     if not told:
         return dark
-    wanted = told[0].setting.temperature_k if temperature_k is None else temperature_k
-    away = [abs(r.setting.temperature_k - wanted) for r in told]
-    return [r for r, k in zip(told, away, strict=True) if k <= min(away) + SAME_K]
+    wanted = told[0][1] if temperature_k is None else temperature_k
+    nearest = min(abs(k - wanted) for _, k in told)
+    return [r for r, k in told if abs(k - wanted) <= nearest + SAME_K]
 
 
 def _or_assumed(number: float, assumed: float) -> float:
