@@ -30,7 +30,7 @@ from agents.study.jobs import REFERENCES, Job
 from agents.training import train_scheduler
 from shotenv.config import EnvConfig
 from shotenv.decision import open_problem
-from unwrap.support import progress
+from unwrap.support import end_with_parent, progress
 
 
 def run_jobs(jobs: Sequence[Job], folder: Path, *, workers: int) -> None:
@@ -176,5 +176,6 @@ def _begin_worker() -> None:
     """One thread; Ctrl-C, which a terminal sends to all, ends it without a word."""
     import torch
 
+    end_with_parent()
     torch.set_num_threads(1)
     signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -60,7 +60,7 @@ room(
     "shotenv.world.geometry",
     "shotenv.world.families",
 )
-room("shotenv.render.backend")
+room("shotenv.render.backend", "unwrap.support")
 room(
     "shotenv.render.surfaces", "unwrap.support", "shotenv.world.geometry", "shotenv.render.backend"
 )

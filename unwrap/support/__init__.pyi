@@ -16,6 +16,7 @@ from .files import (
     write_text as write_text,
 )
 from .npy_header import NpyHeader as NpyHeader, read_npy_header as read_npy_header
+from .parent_process import end_with_parent as end_with_parent
 from .process_state import (
     keep_freed_memory as keep_freed_memory,
     torch_threads as torch_threads,

@@ -7,7 +7,6 @@ import os
 import signal
 import sys
 import textwrap
-import threading
 import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator
@@ -18,6 +17,7 @@ from types import ModuleType
 from typing import Generic, TypeVar
 
 from shotenv.render.backend.llvm import RendererError
+from unwrap.support import end_with_parent
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -205,7 +205,7 @@ def _no_main_module() -> Iterator[None]:
 def _serve(pipe: Connection, function: Callable[[Job], Result], threads: int) -> None:
     """Life of a worker process: jobs come in, (result, error, traceback) go out."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_die_with_parent, daemon=True).start()
+    end_with_parent()
     _limit_threads(threads)
     while True:
         try:
@@ -218,13 +218,6 @@ def _serve(pipe: Connection, function: Callable[[Job], Result], threads: int) ->
             pipe.send((None, str(error), None))
         except Exception as error:
             pipe.send((None, f"{type(error).__name__}: {error}", traceback.format_exc()))
-
-
-def _die_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def _limit_threads(threads: int) -> None:
