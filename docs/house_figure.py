@@ -60,7 +60,7 @@ FLOORS = {
 # Lower and upper edges of the rows of rooms.
 TOP = (736, 852)
 BACK, FRONT = (530, 644), (412, 522)
-MAIN, CELLAR = (160, 298), (67, 152)
+MAIN, CELLAR = (174, 298), (67, 166)
 PLACES = {
     "agents.cli": Box(374, 626, 900, 954),
     "agents.report": Box(30, 120, *TOP),
@@ -86,17 +86,20 @@ PLACES = {
     "shotenv.laser": Box(490, 650, *FRONT),
     "shotenv.decision": Box(658, 818, *FRONT),
     "shotenv.env": Box(826, 950, FRONT[0], BACK[1]),
-    "unwrap.recordings": Box(30, 178, *MAIN),
-    "unwrap.signal": Box(186, 366, *MAIN),
-    "unwrap.networks": Box(374, 604, *MAIN),
-    "unwrap.networks.peers": Box(384, 594, 168, 194),
-    "unwrap.depth": Box(612, 794, *MAIN),
-    "unwrap.training": Box(802, 970, *MAIN),
-    "unwrap.ros": Box(30, 178, *CELLAR),
-    "unwrap.comparison": Box(186, 376, *CELLAR),
-    "unwrap.export": Box(384, 568, *CELLAR),
-    "unwrap.pictures": Box(576, 702, *CELLAR),
-    "unwrap.support": Box(710, 970, *CELLAR),
+    "unwrap.cameras": Box(30, 144, *MAIN),
+    "unwrap.cameras.files": Box(40, 134, 179, 202),
+    "unwrap.recordings": Box(152, 272, *MAIN),
+    "unwrap.signal": Box(280, 412, *MAIN),
+    "unwrap.networks": Box(420, 624, *MAIN),
+    "unwrap.networks.peers": Box(430, 614, 179, 202),
+    "unwrap.depth": Box(632, 800, *MAIN),
+    "unwrap.training": Box(808, 970, *MAIN),
+    "unwrap.ros": Box(30, 130, *CELLAR),
+    "unwrap.calibration": Box(138, 290, *CELLAR),
+    "unwrap.comparison": Box(298, 460, *CELLAR),
+    "unwrap.export": Box(468, 620, *CELLAR),
+    "unwrap.pictures": Box(628, 748, *CELLAR),
+    "unwrap.support": Box(756, 970, *CELLAR),
 }
 """Where each room is drawn. Rooms on the frame's way touch the hallway of their floor."""
 
@@ -108,7 +111,7 @@ WAY: Points = (
 )
 """What a frame becomes, from the world to the report."""
 JOINING: tuple[Points, ...] = (
-    ((104, LOWER), (343, LOWER)),
+    ((212, LOWER), (343, LOWER)),
     ((540, MIDDLE), (636, MIDDLE)),
 )
 """Recordings of a real camera, and what the shots cost, join it."""
@@ -118,7 +121,7 @@ DOORS: dict[str, tuple[float, float]] = {
     "shotenv.world": (104, MIDDLE),
     "shotenv.render": (236, MIDDLE),
     "shotenv.sensor": (343, MIDDLE),
-    "unwrap.recordings": (104, LOWER),
+    "unwrap.recordings": (212, LOWER),
     "unwrap.signal": (343, LOWER),
     "unwrap.networks": (489, LOWER),
     "unwrap.depth": (636, LOWER),
@@ -131,7 +134,7 @@ DOORS: dict[str, tuple[float, float]] = {
 }
 """Where rooms open to the hallway."""
 HEADS: tuple[tuple[str, tuple[float, float]], ...] = (
-    *((">", (127, MIDDLE)), (">", (224, LOWER)), (">", (466, LOWER)), (">", (936, MIDDLE))),
+    *((">", (127, MIDDLE)), (">", (282, LOWER)), (">", (466, LOWER)), (">", (936, MIDDLE))),
     *(("^", (966, 540)), ("<", (740, UPPER)), ("<", (400, UPPER))),
 )
 """Which way it goes."""

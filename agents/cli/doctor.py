@@ -1,4 +1,4 @@
-"""What is installed, what is missing, and the one command that mends it."""
+"""The command that says what is installed, what is missing, and the one command that mends it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,10 @@ import shutil
 import sys
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
+
+from jsonargparse import Namespace
+
+from agents.cli.command import DONE, FAILED, Command, add_json, write_numbers
 
 NEEDED_BYTES = 2 * 10**9  # assumed: the starter bank, its predictions and a run, with room to spare
 OLDEST_PYTHON = (3, 11)
@@ -118,3 +122,22 @@ def shipped_networks() -> tuple[Finding, ...]:
             detail = f"width {unwrapper.metadata['width']}, sha256 {unwrapper.fingerprint[:12]}"
             found.append(Finding(name, True, detail))
     return tuple(found)
+
+
+def tell_findings(arguments: Namespace) -> int:
+    """Say what is installed and what is missing; fails where something is."""
+    findings = examine()
+    for finding in findings:
+        print(finding)
+    write_numbers(arguments, [vars(finding) for finding in findings])
+    return DONE if all(finding.well for finding in findings) else FAILED
+
+
+COMMANDS = (
+    Command(
+        "doctor",
+        "say what is installed, what is missing and what mends it",
+        add_json,
+        tell_findings,
+    ),
+)

@@ -15,8 +15,10 @@ from jsonargparse import ArgumentError, Namespace
 
 from agents.cli import (
     bank_commands,
+    camera_calibrate_command,
+    camera_commands,
     collect_command,
-    doctor_command,
+    doctor,
     export_command,
     play_command,
     problem_command,
@@ -28,7 +30,7 @@ from shotenv.config import ConfigError, one_sentence
 
 HELP = ("--help", "-h", "help")
 COMMANDS: tuple[Command, ...] = (
-    *doctor_command.COMMANDS,
+    *doctor.COMMANDS,
     *schedule_commands.COMMANDS,
     *problem_command.COMMANDS,
     *play_command.COMMANDS,
@@ -36,6 +38,8 @@ COMMANDS: tuple[Command, ...] = (
     *export_command.COMMANDS,
     *bank_commands.COMMANDS,
     *unwrap_commands.COMMANDS,
+    *camera_commands.COMMANDS,
+    *camera_calibrate_command.COMMANDS,
 )
 
 

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
 from jsonargparse import ArgumentParser, Namespace
 
+from agents.cli.camera_commands import (
+    SIMULATED,
+    add_recording,
+    correct_camera_files,
+    depth_log,
+    tell_of_frames,
+    unwrapper_of,
+)
 from agents.cli.command import (
     DONE,
     Command,
@@ -95,19 +103,33 @@ def compare_methods(arguments: Namespace) -> int:
 
 def correct_arguments(parser: ArgumentParser) -> None:
     """Which recording, of which camera, and where its depth goes."""
-    parser.add_argument("input", type=Path, help=".npy, .npz, or a folder of 16-bit PNG files")
     from unwrap.depth import Eight
 
+    add_recording(parser)
+    parser.add_argument(
+        "--camera",
+        metavar="NAME",
+        help="name or path of the camera's description; without it .npy, .npz or a folder of "
+        "16-bit PNG files, in the order of docs/correct_and_export.md",
+    )
     add_sensor_and_merge(parser)
     ways = ", ".join(get_args(Eight))
     parser.add_argument(
         "--eight", type=Eight, default="two_frequency", help=f"who unwraps 8 samples: {ways}"
     )
-    parser.add_argument("--unwrapper", default="tofsegnet", help="name or path of a network")
+    parser.add_argument(
+        "--unwrapper",
+        default="tofsegnet",
+        help="name or path of a network, or none: 2 and 4 samples stay wrapped",
+    )
     add_out(parser, "runs/corrected", "folder of the depth")
-    parser.add_argument("--gray", type=Path, metavar="FILE", help="gray images (.npy, .npz, .png)")
     parser.add_argument("--offset", type=Path, metavar="FILE", help="dark-offset map (.npy), LSB")
-    parser.add_argument("--wiggle", type=Path, metavar="FILE", help="the sensor's own wiggle table")
+    parser.add_argument(
+        "--wiggle",
+        type=Path,
+        metavar="FILE",
+        help="the camera's own wiggle tables, or simulated: those of --sensor (default: none)",
+    )
     parser.add_argument("--noise-lsb", type=float, metavar="X", help="std of a sample, LSB")
     parser.add_argument("--fov-deg", type=float, default=60.0, help="horizontal field of view")
     add_depth_files(parser)
@@ -127,17 +149,10 @@ def add_depth_files(parser: ArgumentParser) -> None:
     parser.add_argument("--overwrite", action="store_true", help="replace files that stand in DIR")
 
 
-def depth_log(arguments: Namespace) -> AbstractContextManager[Any]:
-    """The file that `--mcap` names, open; or None."""
-    from unwrap.ros import mcap_log
-
-    if arguments.mcap is None:
-        return nullcontext()
-    return mcap_log(arguments.mcap, arguments.frame_rate_hz)
-
-
 def correct_files(arguments: Namespace) -> int:
     """Correct a recording; where anything is refused, nothing is written."""
+    if arguments.camera is not None:
+        return correct_camera_files(arguments)
     from shotenv.config import SensorConfig, find_config, read_config
     from shotenv.sensor import description_of
     from unwrap.recordings import (
@@ -149,32 +164,36 @@ def correct_files(arguments: Namespace) -> int:
     )
 
     sensor = read_config(SensorConfig, find_config("sensor", arguments.sensor))
+    description, unwrapper = description_of(sensor), unwrapper_of(arguments)
+    if arguments.wiggle != SIMULATED:
+        # A table of a simulated sensor is none of a real one's; its own is read below.
+        description = replace(description, wiggle=None)
     camera = camera_of(
-        description_of(sensor),
+        description,
         bits=sensor.adc_bits,
-        unwrapper=arguments.unwrapper,
+        unwrapper=unwrapper,
         merge=arguments.merge,
         eight=arguments.eight,
         horizontal_fov_deg=arguments.fov_deg,
-        wiggle=arguments.wiggle,
+        wiggle=None if arguments.wiggle == SIMULATED else arguments.wiggle,
         noise_lsb=arguments.noise_lsb,
     )
     recording = load_recording(
-        arguments.input, bits=camera.bits, gray=arguments.gray, offset=arguments.offset
+        arguments.input,
+        bits=camera.bits,
+        gray=arguments.gray,
+        offset=arguments.offset,
+        unwrapped=unwrapper is not None,
     )
     if not arguments.overwrite:
-        refuse_overwriting(recording, arguments.out, points=arguments.points, mcap=arguments.mcap)
+        names = recording.names
+        refuse_overwriting(names, arguments.out, points=arguments.points, mcap=arguments.mcap)
     frames = correct_recording(recording, camera)
     with depth_log(arguments) as log, progress(len(frames), "writing", "frame") as bar:
         found = write_frames(
             frames, camera, arguments.out, points=arguments.points, log=log, tick=bar.update
         )
-    for frame in found["frames"]:
-        told = f"{100 * frame['valid_share']:.1f} % valid, median {frame['median_m']:.3f} m"
-        if frame["pixels_beyond_png"]:
-            told += f", {frame['pixels_beyond_png']} beyond 65.535 m in the PNG"
-        told += f", noise {frame['noise_lsb']:.2f} LSB ({frame['noise_source']})"
-        print(f"{frame['folder']}: {told}")
+    tell_of_frames(found)
     write_numbers(arguments, found)
     return DONE
 

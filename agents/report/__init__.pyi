@@ -1,4 +1,5 @@
 from .answer import budget_lines as budget_lines, details as details, verdict as verdict
+from .calibration_page import write_calibration_page as write_calibration_page
 from .comparison import write_comparison as write_comparison
 from .evaluation_files import write_evaluation as write_evaluation
 from .page import write_report as write_report

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("support", "signal", "depth", "networks", "training")
+ROOMS = ("support", "signal", "depth", "networks", "training", "cameras")
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 MODULES = sorted(
     ".".join(path.relative_to(ROOT).with_suffix("").parts)

@@ -12,6 +12,7 @@ from .correction import (
     turns_table as turns_table,
 )
 from .kernel_density import (
+    KernelDensity as KernelDensity,
     unwrap_kernel_density as unwrap_kernel_density,
     vote_frequencies as vote_frequencies,
 )

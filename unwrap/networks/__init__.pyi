@@ -31,7 +31,7 @@ from .registry import (
     build_network as build_network,
     network_class as network_class,
 )
-from .sizes import predict_thinned as predict_thinned
+from .sizes import predict_thinned as predict_thinned, trained_size as trained_size
 from .toffusionnet import true_wraps as true_wraps
 from .tofregnet import TofRegNet as TofRegNet
 from .tofsegnet import (

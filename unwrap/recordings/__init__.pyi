@@ -1,3 +1,4 @@
+from .arrays import read_arrays as read_arrays
 from .camera import Camera as Camera, camera_of as camera_of
 from .depth_output import (
     Points as Points,
@@ -7,8 +8,18 @@ from .depth_output import (
 from .frame_correction import (
     CorrectedFrame as CorrectedFrame,
     correct_recording as correct_recording,
+    require_valid as require_valid,
 )
-from .loading import load_recording as load_recording
+from .images import read_png_folder as read_png_folder
+from .loading import (
+    load_recording as load_recording,
+    read_map as read_map,
+    require_gray as require_gray,
+    with_stored_offset as with_stored_offset,
+)
+from .network_choice import (
+    frequency_warning as frequency_warning,
+)
 from .recording import (
     NoUsablePixelError as NoUsablePixelError,
     Recording as Recording,

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from torch import Tensor
+
 from unwrap.depth import Eight, Merge
 from unwrap.signal import SensorDescription, WiggleTable, read_wiggle
 
@@ -19,8 +21,9 @@ class Camera:
         With the stored wiggle tables.
     bits : int
         Of the converter.
-    unwrapper : str
-        Name or path of a network; it is loaded where a recording has gray images.
+    unwrapper : str or None
+        Name or path of a network, which is asked where a recording has gray images; None leaves
+        two and four samples wrapped.
     merge : "nearest", "floor" or "none"
     eight : "two_frequency", "kernel_density" or "network"
         Who tells the wraps of eight samples, see `unwrap.correct`.
@@ -29,27 +32,31 @@ class Camera:
     noise_lsb : float or None
         Standard deviation of one sample where it is told; None leaves it to each recording's own
         samples, see `unwrap.recordings.sample_noise`.
+    rays : float64 [3, H, W] or None
+        Unit vectors ahead, left and up of the pixels, in place of the field of view.
     """
 
     description: SensorDescription
     bits: int
-    unwrapper: str
+    unwrapper: str | None
     merge: Merge
     horizontal_fov_deg: float
     noise_lsb: float | None = None
     eight: Eight = "two_frequency"
+    rays: Tensor | None = None
 
 
 def camera_of(
     description: SensorDescription,
     *,
     bits: int,
-    unwrapper: str,
+    unwrapper: str | None,
     merge: Merge,
     horizontal_fov_deg: float,
     wiggle: Path | None = None,
     noise_lsb: float | None = None,
     eight: Eight = "two_frequency",
+    rays: Tensor | None = None,
 ) -> Camera:
     """Camera with a sensor like `description`, but maybe with tables and noise of its own.
 
@@ -57,7 +64,7 @@ def camera_of(
     ----------
     description : SensorDescription
         Of the kind of sensor.
-    bits, unwrapper, merge, horizontal_fov_deg, eight
+    bits, unwrapper, merge, horizontal_fov_deg, eight, rays
         See `Camera`.
     wiggle : Path, optional
         Tables measured with this camera, at both frequencies, in place of those of its kind.
@@ -78,7 +85,7 @@ def camera_of(
         if not 0 <= noise_lsb <= 2**bits:
             raise ValueError(f"noise_lsb is {noise_lsb:g}; expected 0 to {2**bits}")
         description = replace(description, noise_lsb=noise_lsb)
-    return Camera(description, bits, unwrapper, merge, horizontal_fov_deg, noise_lsb, eight)
+    return Camera(description, bits, unwrapper, merge, horizontal_fov_deg, noise_lsb, eight, rays)
 
 
 def _tables_at_both(path: Path, sensor: SensorDescription) -> tuple[WiggleTable, WiggleTable]:

@@ -16,7 +16,6 @@ from unwrap.recordings.depth_picture import draw_frame
 from unwrap.recordings.frame_correction import CorrectedFrame
 from unwrap.recordings.images import HIGHEST_MM, depth_png, whole_millimetres
 from unwrap.recordings.pcd import encode_pcd
-from unwrap.recordings.recording import Recording
 from unwrap.ros import McapLog
 from unwrap.support import write_bytes
 
@@ -30,9 +29,9 @@ def output_files(points: Points) -> tuple[str, ...]:
 
 
 def refuse_overwriting(
-    recording: Recording, out: Path, *, points: Points = "ply", mcap: Path | None = None
+    names: Sequence[str], out: Path, *, points: Points = "ply", mcap: Path | None = None
 ) -> None:
-    """Check that no file stands where `write_frames` would write one, and none at `mcap`.
+    """Check that no file stands where `write_frames` would write frames of these names, or `mcap`.
 
     Raises
     ------
@@ -40,7 +39,7 @@ def refuse_overwriting(
         One stands already; the message names it.
     """
     # All frames at once: half a recording written would be worse than none.
-    files = [out / name / file for name in recording.names for file in output_files(points)]
+    files = [out / name / file for name in names for file in output_files(points)]
     for path in files if mcap is None else (*files, mcap):
         if path.exists():
             raise ValueError(f"{path} stands already; --overwrite replaces it")
@@ -53,6 +52,7 @@ def write_frames(
     *,
     points: Points = "ply",
     log: McapLog | None = None,
+    times_s: Sequence[float] | None = None,
     tick: Callable[[], object] = lambda: None,
 ) -> dict[str, Any]:
     """Write the files of every frame, into a folder each where there are several.
@@ -63,6 +63,8 @@ def write_frames(
         Format of the points.
     log : McapLog, optional
         Takes every frame, too.
+    times_s : sequence of float, optional
+        When each frame was recorded, for the log.
     tick : callable
         Called after each frame.
 
@@ -72,15 +74,16 @@ def write_frames(
         `shots`, `merge`, `eight`, and of each of the `frames` its `folder` and `frame_statistics`.
     """
     numbers = []
-    for frame in frames:
+    for number, frame in enumerate(frames):
         # The frame of a recording without an axis of frames is named "": it lies in `out` itself.
         folder = out / frame.recording.names[0]
         for name, content in encode_frame(frame, camera, points).items():
             write_bytes(folder / name, content)
         if log is not None:
-            cloud = organised_cloud(frame, camera.horizontal_fov_deg)
+            cloud, valid = organised_cloud(frame, camera), frame.depth.valid[0].numpy()
+            time_s = None if times_s is None else times_s[number]
             # REP 118: along the axis of the camera, not along the ray of the pixel.
-            log.add(whole_millimetres(cloud[..., 0], frame.depth.valid[0].numpy()), cloud)
+            log.add(whole_millimetres(cloud[..., 0], valid), cloud, time_s=time_s)
         numbers.append({"folder": str(folder), **frame_statistics(frame)})
         tick()
     shots = int(frames[0].recording.raw.shots)
@@ -96,7 +99,7 @@ def encode_frame(frame: CorrectedFrame, camera: Camera, points: Points) -> dict[
         _npy(depth_m.astype(np.float32)),
         _npy(valid),
         depth_png(depth_m, valid),
-        ENCODERS[points](frame, camera.horizontal_fov_deg),
+        ENCODERS[points](frame, camera),
         picture.getvalue(),
     )
     return dict(zip(output_files(points), encoded, strict=True))
@@ -122,13 +125,20 @@ def frame_statistics(frame: CorrectedFrame) -> dict[str, float | int | str]:
     }
 
 
-def point_cloud(frame: CorrectedFrame, horizontal_fov_deg: float) -> bytes:
+def view_points(frame: CorrectedFrame, camera: Camera) -> torch.Tensor:
+    """What the pixels see, metres ahead, left and up, float64 [3, H, W]."""
+    distance_m = frame.depth.distance_m.double()
+    if camera.rays is not None:
+        return camera.rays * distance_m
+    return points_of(distance_m, focal_px(distance_m.shape[-1], camera.horizontal_fov_deg))[:, 0]
+
+
+def point_cloud(frame: CorrectedFrame, camera: Camera) -> bytes:
     """Binary little-endian PLY of the valid pixels: metres ahead, left and up, gray as colour."""
     import trimesh  # Here: it takes long to load, and only this needs it.
 
-    valid, width = frame.depth.valid[0], frame.depth.valid.shape[-1]
-    focal = focal_px(width, horizontal_fov_deg)
-    points = points_of(frame.depth.distance_m.double(), focal)[:, 0, valid].T
+    valid = frame.depth.valid[0]
+    points = view_points(frame, camera)[:, valid].T
     colors = None
     if frame.recording.gray is not None:
         # Four channels, the last opaque: trimesh colours have no other form.
@@ -137,25 +147,22 @@ def point_cloud(frame: CorrectedFrame, horizontal_fov_deg: float) -> bytes:
     return trimesh.PointCloud(points.numpy(), colors=colors).export(file_type="ply")
 
 
-def organised_cloud(frame: CorrectedFrame, horizontal_fov_deg: float) -> np.ndarray:
+def organised_cloud(frame: CorrectedFrame, camera: Camera) -> np.ndarray:
     """Points and intensity float32 [H, W, 4]: metres ahead, left and up, amplitude in LSB.
 
     NaN where not valid.
     """
     depth = frame.depth
-    points = points_of(
-        depth.distance_m.double(), focal_px(depth.valid.shape[-1], horizontal_fov_deg)
-    )
-    maps = torch.cat((points[:, 0].float(), depth.amplitude))
+    maps = torch.cat((view_points(frame, camera).float(), depth.amplitude))
     return maps.where(depth.valid, torch.nan).movedim(0, -1).numpy()
 
 
-def pcd_cloud(frame: CorrectedFrame, horizontal_fov_deg: float) -> bytes:
+def pcd_cloud(frame: CorrectedFrame, camera: Camera) -> bytes:
     """Binary PCD of the valid pixels: metres ahead, left and up, amplitude as intensity."""
-    return encode_pcd(organised_cloud(frame, horizontal_fov_deg)[frame.depth.valid[0].numpy()])
+    return encode_pcd(organised_cloud(frame, camera)[frame.depth.valid[0].numpy()])
 
 
-ENCODERS: Mapping[Points, Callable[[CorrectedFrame, float], bytes]] = {
+ENCODERS: Mapping[Points, Callable[[CorrectedFrame, Camera], bytes]] = {
     "ply": point_cloud,
     "pcd": pcd_cloud,
 }

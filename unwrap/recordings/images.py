@@ -50,18 +50,38 @@ def read_gray16(path: Path) -> np.ndarray:
 
 
 def read_folder(folder: Path, *, bits: int = ADC_BITS) -> Recording:
-    """Recording of a folder with `dcs_0.png`, `dcs_1.png`, ... and maybe `gray.png`.
-
-    Or with one such folder for each frame, which come in the order of their names.
+    """Recording of a folder of images, see `read_png_folder`, which says what is refused.
 
     Raises
     ------
     ValueError
-        No images, a gap in their numbers, frames that are not alike, or what `recording_of` and
-        `read_gray16` refuse.
+        What `recording_of` refuses, too.
+    """
+    arrays, names = read_png_folder(folder)
+    return recording_of(arrays, str(folder), bits=bits, names=names)
+
+
+def read_png_folder(folder: Path) -> tuple[dict[str, np.ndarray], tuple[str, ...] | None]:
+    """Arrays of a folder with `dcs_0.png`, `dcs_1.png`, ... and maybe `gray.png`.
+
+    Or with one such folder for each frame, which come in the order of their names.
+
+    Returns
+    -------
+    dict
+        `dcs` [n, H, W] and maybe `gray` [H, W]; with an axis of frames before these where there
+        are folders of them.
+    tuple of str or None
+        Names of the folders; None where there is one frame.
+
+    Raises
+    ------
+    ValueError
+        No images, a gap in their numbers, frames that are not alike, or what `read_gray16`
+        refuses.
     """
     if any(folder.glob("dcs_*.png")):
-        return recording_of(_read_frame(folder), str(folder), bits=bits)
+        return _read_frame(folder), None
     # As text: "10" comes before "9", but not before "09".
     frames = sorted(path for path in folder.iterdir() if any(path.glob("dcs_*.png")))
     if not frames:
@@ -76,8 +96,7 @@ def read_folder(folder: Path, *, bits: int = ADC_BITS) -> Recording:
         if kind != kinds[0]:
             raise ValueError(f"{frame}: holds {kind}; expected {kinds[0]}, as {frames[0].name}")
     together = {name: np.stack([frame[name] for frame in arrays]) for name in arrays[0]}
-    names = tuple(frame.name for frame in frames)
-    return recording_of(together, str(folder), bits=bits, names=names)
+    return together, tuple(frame.name for frame in frames)
 
 
 def _read_frame(folder: Path) -> dict[str, np.ndarray]:

@@ -19,7 +19,12 @@ from unwrap.signal import ADC_BITS, Shots
 
 
 def load_recording(
-    path: Path, *, bits: int = ADC_BITS, gray: Path | None = None, offset: Path | None = None
+    path: Path,
+    *,
+    bits: int = ADC_BITS,
+    gray: Path | None = None,
+    offset: Path | None = None,
+    unwrapped: bool = True,
 ) -> Recording:
     """Recording of a file or a folder, complete enough to be unwrapped.
 
@@ -33,6 +38,9 @@ def load_recording(
         Gray images, in place of those of the recording: `.npy`, `.npz` or a 16-bit `.png`.
     offset : Path, optional
         Dark-offset map, in place of the recording's: `.npy` or `.npz`.
+    unwrapped : bool
+        Whether a network is to unwrap it; the wrapped distance needs no gray image,
+        and a dark scene has none.
 
     Raises
     ------
@@ -41,21 +49,45 @@ def load_recording(
     """
     recording = (read_folder if path.is_dir() else read_recording)(path, bits=bits)
     if gray is not None:
-        recording = with_gray(recording, _read_map(gray, "gray"), str(gray), bits=bits)
+        recording = with_gray(recording, read_map(gray, "gray"), str(gray), bits=bits)
     if offset is not None:
-        recording = with_offset(recording, _read_map(offset, "offset_lsb"), str(offset))
+        recording = with_stored_offset(recording, offset)
+    if unwrapped:
+        require_gray(recording, str(path))
+    return recording
+
+
+def require_gray(recording: Recording, where: str) -> None:
+    """Check that there are gray images where there are too few samples to do without.
+
+    Raises
+    ------
+    ValueError
+        There are none; the message begins with `where`.
+    """
     shots = recording.raw.shots
     # Eight samples tell the wrap by their two frequencies; fewer need a network, which needs gray.
     if recording.gray is None and shots != Shots.EIGHT:
         raise ValueError(
-            f"{path}: {int(shots)} samples and no gray image; expected gray images beside them, in "
-            "the recording or with --gray, or 8 samples"
+            f"{where}: {int(shots)} samples and no gray image; expected gray images beside them, "
+            "in the recording or with --gray, or 8 samples, or --unwrapper none for the wrapped "
+            "distance"
         )
-    return recording
 
 
-def _read_map(path: Path, name: str) -> np.ndarray:
-    """The array `name` of a file; the only one in an `.npy` file or an image."""
+def with_stored_offset(recording: Recording, path: Path) -> Recording:
+    """`recording` with the dark-offset map of an `.npy` or `.npz` file."""
+    return with_offset(recording, read_map(path, "offset_lsb"), str(path))
+
+
+def read_map(path: Path, name: str) -> np.ndarray:
+    """The array `name` of a file; the only one in an `.npy` file or an image.
+
+    Raises
+    ------
+    ValueError
+        The file is missing, damaged, too large or of another kind, or has no such array.
+    """
     if path.suffix == ".png":
         return read_gray16(path)
     arrays = read_arrays(path, name, ARRAYS)

@@ -40,19 +40,22 @@ class Recording:
         Stored dark-offset map.
     names : tuple of str
         Of the frames; a single "" where there is one frame and no axis of frames.
+    made : bool
+        Four samples were made of less, so that opposite ones agree and tell no noise.
     """
 
     raw: RawFrame
     gray: Tensor | None
     offset_lsb: Tensor | None
     names: tuple[str, ...]
+    made: bool = False
 
     def frame(self, number: int) -> Recording:
         """One frame alone."""
         one = slice(number, number + 1)
         raw = RawFrame(self.raw.dcs_lsb[one], self.raw.saturated[one])
         gray = None if self.gray is None else self.gray[one]
-        return Recording(raw, gray, self.offset_lsb, self.names[one])
+        return Recording(raw, gray, self.offset_lsb, self.names[one], self.made)
 
 
 def read_recording(path: Path, *, bits: int = ADC_BITS) -> Recording:

@@ -41,12 +41,12 @@ class SampleNoise:
     source: NoiseSource
 
 
-def noise_of(raw: RawFrame, camera: Camera) -> SampleNoise:
-    """Noise of the samples of one frame, a batch of one."""
+def noise_of(raw: RawFrame, camera: Camera, *, made: bool = False) -> SampleNoise:
+    """Noise of the samples of one frame, a batch of one; `made` ones do not tell it."""
     blank = torch.zeros(raw.saturated.shape)
     if camera.noise_lsb is not None:
         return SampleNoise(blank + camera.noise_lsb, "told")
-    if raw.shots == Shots.TWO:
+    if raw.shots == Shots.TWO or made:
         return SampleNoise(blank + camera.description.noise_lsb, "dark noise")
     measured_lsb = opposite_samples_noise_lsb(raw)
     # NaN where all neighbours are saturated: of such a pixel nothing is valid anyway.

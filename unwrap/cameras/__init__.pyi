@@ -1,0 +1,12 @@
+from .camera_depth import (
+    camera_for as camera_for,
+    correct_frames as correct_frames,
+    sensor_of as sensor_of,
+)
+from .camera_frames import CameraFrames as CameraFrames, dropped_frames as dropped_frames
+from .camera_recording import (
+    CameraRecording as CameraRecording,
+    open_camera_recording as open_camera_recording,
+)
+from .labelling import Labelling as Labelling, fitting as fitting, labellings as labellings
+from .recording_summary import Summary as Summary, summary_of as summary_of
