@@ -139,8 +139,8 @@ def test_the_study_that_ships_can_be_read():
     jobs = jobs_of(plan)
     assert len(plan.seeds) >= 5
     seeds = len(plan.seeds)
-    # References and fifteen rules once; three learners and random with each seed; four ablations.
-    default = 1 + 15 + (4 + 4) * seeds
+    # References and fifteen rules once; six learners and random with each seed; four ablations.
+    default = 1 + 15 + (7 + 4) * seeds
     # References and a rule; one learner there, two in each table of the transfer.
     hot, elsewhere = 1 + 1 + seeds, len(plan.transfer.tables) * (1 + 1 + 2 * seeds)
     assert len(jobs) == default + hot + elsewhere
