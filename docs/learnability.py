@@ -32,7 +32,7 @@ from shotenv.decision import FEATURE_NAMES, feature_index
 
 STEPS: Final = 150_000
 GAMMA: Final = 0.95
-DRIVES: Final = 96
+DRIVES: Final = 192
 ALGORITHMS: Final[Mapping[str, type[BaseAlgorithm]]] = {"PPO": PPO, "DQN": DQN}
 LOOKED: Final = (
     "two_from_four",

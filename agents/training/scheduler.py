@@ -88,7 +88,7 @@ def _trained(
     if agent.algorithm in ("ppo", "recurrent_ppo"):
         return ppo_trainer(env, config, validate, out).run()
     envs = Sb3VecEnv(make_envs(env, "train", agent.dqn.num_envs, "SameStep"))
-    return QLearner(envs, FEATURE_NAMES, agent, validate, out, env).run()
+    return QLearner(envs, FEATURE_NAMES, env.frames_per_drive, agent, validate, out, env).run()
 
 
 def rescore(

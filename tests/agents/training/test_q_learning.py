@@ -1,13 +1,15 @@
-"""DQN and QR-DQN by the same entry: they learn, the best is kept, and Ctrl-C keeps it, too."""
+"""DQN and QR-DQN by the same entry: they learn, the best is kept, and a run can be resumed."""
 
 import sys
 
 import numpy as np
 import pytest
+import torch
 from test_training import FRAMES, NAMES, make_envs, validate
 
 from agents.config.agent import AgentConfig, DqnConfig
 from agents.policies.learned import load_policy
+from agents.training.checkpoint import CHECKPOINT
 from agents.training.q_learning import QLearner
 from agents.training.sb3_vector import Sb3VecEnv
 from shotenv.config.keywords import env_config
@@ -29,8 +31,9 @@ LEARNER = DqnConfig(
 
 
 def learner(algorithm, out, check=validate, **changes):
-    config = AgentConfig(algorithm=algorithm, hidden=(32,), seed=2, dqn=LEARNER, **changes)
-    return QLearner(Sb3VecEnv(make_envs()), NAMES, config, check, out, PRICED)
+    told = {"hidden": (32,), "seed": 2, "dqn": LEARNER, **changes}
+    config = AgentConfig(algorithm=algorithm, **told)
+    return QLearner(Sb3VecEnv(make_envs()), NAMES, FRAMES, config, check, out, PRICED)
 
 
 @pytest.mark.parametrize("algorithm", ["dqn", "qrdqn"])
@@ -61,24 +64,32 @@ def test_what_is_kept_chooses_as_the_model_does(tmp_path, algorithm):
     np.testing.assert_array_equal(one.policy.act(observed), expected)
 
 
-def test_ctrl_c_keeps_the_best_so_far_and_says_what_is_lost(tmp_path):
-    calls = iter((0.25, 0.5, None))
+@pytest.mark.parametrize("algorithm", ["dqn", "qrdqn"])
+@pytest.mark.parametrize("buffer_size", [1280, 480])
+def test_interrupted_training_equals_uninterrupted(tmp_path, algorithm, buffer_size):
+    """Also where the oldest steps have been forgotten."""
+    dqn = LEARNER.model_copy(update={"buffer_size": buffer_size})
+    whole = learner(algorithm, tmp_path / "whole", dqn=dqn)
+    whole.run()
+    calls = iter((0.25, 0.5))
 
     def interrupted(policy):
-        found = next(calls)
-        if found is None:
+        if (found := next(calls, None)) is None:
             raise KeyboardInterrupt
         return found
 
-    with pytest.raises(KeyboardInterrupt, match=r"best scheduler so far is in .*starts over"):
-        learner("dqn", tmp_path, interrupted).run()
-    assert load_policy(tmp_path).provenance.algorithm == "dqn"
-
-    def at_once(policy):
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt, match=r"^the memory of dqn is not kept"):
-        learner("dqn", tmp_path / "none", at_once).run()
+    parts = learner(algorithm, tmp_path / "parts", interrupted, dqn=dqn)
+    with pytest.raises(KeyboardInterrupt):
+        parts.run()
+    resumed = learner(algorithm, tmp_path / "parts", dqn=dqn)
+    resumed.run()
+    assert resumed.model.num_timesteps == resumed.rounds * resumed.round_steps
+    assert resumed.model.exploration_rate == LEARNER.epsilon
+    # The last networks, of which one is the target.
+    for name, tensor in whole.model.policy.state_dict().items():
+        assert torch.equal(tensor, resumed.model.policy.state_dict()[name]), name
+    # What it learnt from is no longer wanted.
+    assert (tmp_path / "parts" / CHECKPOINT).stat().st_size < 20_000
 
 
 def test_a_missing_package_is_named_with_its_cure(tmp_path, monkeypatch):
@@ -93,5 +104,5 @@ def test_curves_are_written_where_they_are_asked_for(tmp_path):
     events = tensorboard.EventAccumulator(str(tmp_path / "tensorboard"))
     events.Reload()
     points = events.Scalars("validation/return")
-    assert [point.step for point in points] == [400, 800, 1200]
+    assert [point.step for point in points] == [448, 896, 1344]
     assert points[0].step > FRAMES * 4
