@@ -6,16 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import jinja2
-from plotly.offline import get_plotlyjs
-
-from agents.report.calibration_charts import charts_of
-from agents.report.charts import figure_html
+from agents.report import figure_html, page_of
+from agents.report.calibration.calibration_charts import charts_of
 from shotenv.config import SensorConfig
 from unwrap.calibration import CONFIDENCE, BenchConfig, Calibration, interval_text, number_text
 from unwrap.support import write_text
 
-PAGE = "calibration.html.jinja"
+PAGE = Path(__file__).with_name("calibration.html.jinja")
 TITLES = {
     "gain_lsb_per_e": "gain of the converter",
     "contrast": "demodulation contrast",
@@ -54,13 +51,9 @@ def write_calibration_page(
     refused : mapping of str to str
         Fields that the simulation cannot hold, and why.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,  # by default a misspelt name would print nothing
-    )
     rows = rows_of(found, base, units, refused)
-    text = environment.get_template(PAGE).render(
+    text = page_of(
+        PAGE,
         bench=bench,
         base=base.name,
         rows=rows,
@@ -77,7 +70,6 @@ def write_calibration_page(
             {"title": title, "note": note, "figure": figure_html(figure)}
             for title, note, figure in charts_of(found)
         ],
-        plotly=get_plotlyjs(),  # all 4 MB of it: the page is read without a network
     )
     write_text(path, text)
 

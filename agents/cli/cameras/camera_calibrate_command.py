@@ -44,7 +44,7 @@ def calibrate_arguments(parser: ArgumentParser) -> None:
 
 def calibrate(arguments: Namespace) -> int:
     """Measure a camera; write its sensor file, tables, dark-offset map and page."""
-    from agents.report import write_calibration_page
+    from agents.report.calibration import write_calibration_page
     from unwrap.calibration import (
         BENCH_FILE,
         BenchConfig,
@@ -156,12 +156,9 @@ def numbers_of(found: Calibration, refused: dict[str, str]) -> dict[str, Any]:
     }
 
 
-COMMANDS = (
-    Command(
-        "camera calibrate",
-        "measure a camera by its recordings: a sensor to simulate, and a page",
-        calibrate_arguments,
-        calibrate,
-    ),
+CALIBRATE = Command(
+    "camera calibrate",
+    "measure a camera by its recordings: a sensor to simulate, and a page",
+    calibrate_arguments,
+    calibrate,
 )
-"""Commands of this file."""
