@@ -36,7 +36,14 @@ room("unwrap.ros", "unwrap.support")
 room("unwrap.recordings", *UNWRAPPING, "unwrap.pictures", "unwrap.ros")
 room("unwrap.cameras.files", "unwrap.support", "unwrap.signal", "unwrap.recordings")
 room("unwrap.cameras", *UNWRAPPING, "unwrap.recordings", "unwrap.cameras.files")
-room("unwrap.calibration", *SIGNAL, "unwrap.depth", "unwrap.recordings")
+room(
+    "unwrap.calibration",
+    *SIGNAL,
+    "unwrap.depth",
+    "unwrap.recordings",
+    "unwrap.cameras.files",
+    "unwrap.cameras",
+)
 room("unwrap.export", *UNWRAPPING, "unwrap.training")
 room("unwrap.comparison", *UNWRAPPING, "unwrap.training", "unwrap.pictures")
 room("unwrap", *UNWRAPPING)

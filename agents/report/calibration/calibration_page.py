@@ -35,6 +35,7 @@ def write_calibration_page(
     base: SensorConfig,
     units: Mapping[str, str],
     refused: Mapping[str, str],
+    described: Mapping[str, str],
 ) -> None:
     """Write the page, self-contained.
 
@@ -50,17 +51,21 @@ def write_calibration_page(
         Of the sensor's fields, in the order of the table.
     refused : mapping of str to str
         Fields that the simulation cannot hold, and why.
+    described : mapping of str to str
+        Fields that the camera's description tells otherwise than the kind of camera.
     """
     rows = rows_of(found, base, units, refused)
     text = page_of(
         PAGE,
         bench=bench,
         base=base.name,
+        described=described,
         rows=rows,
         measured=sum(row["measured"] for row in rows),
         missing=wanted(found),
         recordings=[
-            {"file": row.file, "frames": moments.frames, **row.model_dump()}
+            # What the recording itself tells stands in its setting.
+            {"frames": moments.frames, **row.model_dump(), **vars(moments.setting)}
             for row, moments in zip(bench.recordings, found.recordings, strict=True)
         ],
         tables=[f"{hz / 1e6:g} MHz" for hz in found.tables],
