@@ -17,7 +17,7 @@ from agents.cli.command import (
     section_of,
     write_numbers,
 )
-from unwrap.support import progress
+from unwrap.support import progress, say
 
 
 def train_arguments(parser: ArgumentParser) -> None:
@@ -32,11 +32,18 @@ def train_arguments(parser: ArgumentParser) -> None:
 
 def train_network(arguments: Namespace) -> int:
     """Train an unwrapping network."""
-    from shotenv.dataset import sources
+    from shotenv.dataset import for_sensor, gray_warning, sources
     from unwrap.training import TrainConfig, train
 
-    config = section_of(TrainConfig, arguments)
-    print(f"The network is in {train(config, sources(config), arguments.out)}")
+    config = for_sensor(section_of(TrainConfig, arguments))
+    splits = sources(config)  # What does not go together is told at once.
+    if (warning := gray_warning(config)) is not None:
+        say(f"warning: {warning}")
+    print(
+        f"{config.network} for {config.f1_hz / 1e6:g} MHz: wraps of "
+        f"{config.settings.unambiguous_m:.3g} m, up to {config.max_range_m:g} m"
+    )
+    print(f"The network is in {train(config, splits, arguments.out)}")
     return DONE
 
 
