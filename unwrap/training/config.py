@@ -122,14 +122,14 @@ class TrainConfig(Section):
                 f"and {self.network} looks at samples; expected that, or another sensor"
             )
         found = found._where_unchosen({"clamp_m": BEYOND * found.max_range_m})
-        if self.network != "tofsegnet":
+        if not network_class(self.network).uses_classes:
             return found
         classes = math.floor(found.max_range_m / unambiguous_range_m(found.f1_hz)) + 1
         if classes > MOST_CLASSES and found.classes == TrainConfig().classes:
             raise ValueError(
-                f"max_range_m is {found.max_range_m:g}, which {classes - 1} wraps of "
-                f"{unambiguous_range_m(found.f1_hz):.3g} m end before; expected fewer than "
-                f"{MOST_CLASSES}, or a network without classes, such as tofregnet"
+                f"max_range_m is {found.max_range_m:g}, within which {classes} wraps of "
+                f"{unambiguous_range_m(found.f1_hz):.3g} m begin; expected at most {MOST_CLASSES}, "
+                "or a network without classes, such as tofregnet"
             )
         return found._where_unchosen({"classes": classes})
 
