@@ -6,9 +6,10 @@
 from __future__ import annotations
 
 import ast
-import re
 from collections.abc import Iterator
 from pathlib import Path
+
+from marked_tables import marked
 
 import shotenv.decision
 
@@ -36,13 +37,7 @@ def filled(page: str) -> str:
     lines = ["| | feature | from | meaning | formula |", "|---|---|---|---|---|"]
     for number, (name, source, meaning, formula) in enumerate(formulas()):
         lines.append(f"| {number} | `{name}` | {source} | {meaning} | `{formula}` |")
-    text = "<!-- features -->\n\n" + "\n".join(lines) + "\n\n<!-- end -->"
-    page, count = re.subn(
-        r"<!-- features -->\n.*?<!-- end -->", lambda _: text, page, flags=re.DOTALL
-    )
-    if count != 1:
-        raise ValueError(f"{PAGE} has {count} places for the table; expected one")
-    return page
+    return marked(page, "features", "\n".join(lines), PAGE)
 
 
 if __name__ == "__main__":

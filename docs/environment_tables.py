@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any, get_args
+
+from marked_tables import marked
 
 from shotenv.config import EnvConfig, RewardConfig, env_config
 from shotenv.decision import FEATURES, TERMS
@@ -82,13 +83,7 @@ TABLES = {"weights": weights, "features": features, "info": info, "arguments": a
 def filled(page: str) -> str:
     """`page` with the tables between its marks `<!-- name -->` and `<!-- end -->`."""
     for name, table in TABLES.items():
-        # A function, since a replacement's backslashes would be read as groups.
-        text = f"<!-- {name} -->\n\n{table()}\n\n<!-- end -->"
-        page, count = re.subn(
-            rf"<!-- {name} -->\n.*?<!-- end -->", lambda _, text=text: text, page, flags=re.DOTALL
-        )
-        if count != 1:
-            raise ValueError(f"{PAGE} has {count} places for the table {name!r}; expected one")
+        page = marked(page, name, table(), PAGE)
     return page
 
 

@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import torch
+from marked_tables import marked, said
 from torch import Tensor
 
 from agents.config import StudyConfig
@@ -172,21 +172,9 @@ def rows_of(rows: Sequence[Row], network: str) -> list[Row]:
     return [one for one in rows if one["network"] == network]
 
 
-def said(one: Mapping[str, float], scale: float, digits: int, unit: str) -> str:
-    """Mean and interval, as `41 (38 to 45) %`."""
-    mean, low, high = (f"{scale * one[key]:.{digits}f}" for key in ("mean", "low", "high"))
-    return f"{mean} ({low} to {high}){unit}"
-
-
 def filled(page: str, found: Mapping[str, Any]) -> str:
     """`page` with the table between its marks."""
-    text = f"<!-- frequencies -->\n\n{table(found)}\n\n<!-- end -->"
-    page, count = re.subn(
-        r"<!-- frequencies -->\n.*?<!-- end -->", lambda _: text, page, flags=re.DOTALL
-    )
-    if count != 1:
-        raise ValueError(f"{PAGE} has {count} places for the table; expected one")
-    return page
+    return marked(page, "frequencies", table(found), PAGE)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

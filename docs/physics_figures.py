@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 import time
 from collections.abc import Callable
@@ -27,6 +26,7 @@ from figures import (
     stray_light,
 )
 from figures.stage import Made, Row
+from marked_tables import marked
 
 DOCS = Path(__file__).parent
 IMAGES = DOCS / "images" / "physics"
@@ -67,8 +67,6 @@ STYLE = {
     "legend.frameon": False,
     "legend.fontsize": 8,
 }
-# What stands between the marks of the page is replaced, the rest of it is written by hand.
-TABLE = re.compile(r"(?<=<!-- numbers -->\n).*?(?=<!-- end of numbers -->)", re.DOTALL)
 
 
 def main(names: list[str]) -> None:
@@ -80,7 +78,7 @@ def main(names: list[str]) -> None:
     if not names:
         page = DOCS / "physics.md"
         text = page.read_text(encoding="utf-8")
-        page.write_text(TABLE.sub(lambda _: table(rows), text), encoding="utf-8")
+        page.write_text(marked(text, "numbers", table(rows).rstrip(), page), encoding="utf-8")
     print(table(rows))
 
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -20,6 +19,7 @@ from typing import Any, Final
 
 import numpy as np
 import torch
+from marked_tables import marked, said
 
 from agents import FAMILIES_OF_PRACTICE, tune, tuning_envs
 from agents.config import StudyConfig
@@ -148,21 +148,9 @@ def tables(found: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def said(one: Mapping[str, float], scale: float, digits: int, unit: str) -> str:
-    """Mean and interval, as `41 (38 to 45) %`."""
-    mean, low, high = (f"{scale * one[key]:.{digits}f}" for key in ("mean", "low", "high"))
-    return f"{mean} ({low} to {high}){unit}"
-
-
 def filled(page: str, found: Mapping[str, Any]) -> str:
     """`page` with the tables between their marks."""
-    text = f"<!-- tables -->\n\n{tables(found)}\n\n<!-- end -->"
-    page, count = re.subn(
-        r"<!-- tables -->\n.*?<!-- end -->", lambda _: text, page, flags=re.DOTALL
-    )
-    if count != 1:
-        raise ValueError(f"{PAGE} has {count} places for the tables; expected one")
-    return page
+    return marked(page, "tables", tables(found), PAGE)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -12,11 +12,12 @@ writes the page from there. The picture needs matplotlib.
 from __future__ import annotations
 
 import json
-import re
 import shutil
 import sys
 from pathlib import Path
 from typing import Any
+
+from marked_tables import marked
 
 from shotenv.config import configs_dir
 
@@ -251,13 +252,7 @@ def filled_readme(text: str, found: dict[str, Any]) -> str:
     for name, words in ROWS.items():
         one = found["error_at_half_energy"][name]
         rows.append(f"| {words} | {one['mean']:.2f} m | {one['low']:.2f} to {one['high']:.2f} m |")
-    table = "<!-- problem -->\n\n" + "\n".join(rows) + "\n\n<!-- end -->"
-    filled, count = re.subn(
-        r"<!-- problem -->\n.*?<!-- end -->", lambda _: table, text, flags=re.DOTALL
-    )
-    if count != 1:
-        raise ValueError(f"{README} has {count} places for the table; expected one")
-    return filled
+    return marked(text, "problem", "\n".join(rows), README)
 
 
 def main() -> None:

@@ -154,6 +154,12 @@ def tiny_bank(tmp_path_factory, sensor) -> str:
 
 
 @pytest.fixture(scope="session")
+def write_bank():
+    """Writes a bank as the tiny one into a folder, of another sensor."""
+    return write_tiny_bank
+
+
+@pytest.fixture(scope="session")
 def tiny_unwrapper(tmp_path_factory, sensor) -> str:
     """Path of an untrained TofRegNet of width 4; fast, and wrong in a fixed way."""
     torch.manual_seed(0)

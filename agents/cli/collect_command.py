@@ -8,12 +8,15 @@ import numpy as np
 from jsonargparse import ArgumentParser, Namespace
 from jsonargparse.typing import NonNegativeInt, PositiveInt
 
-from agents.cli.command import DONE, Command, add_trust, write_numbers
-from agents.cli.experiment import (
+from agents.cli.command import (
+    DONE,
+    Command,
     add_experiment,
+    add_trust,
     experiment_of,
     play_on_one_thread,
     prepare_bank,
+    write_numbers,
 )
 from agents.cli.play_command import policy_of
 from unwrap.support import progress

@@ -6,7 +6,7 @@ from .bank import (
     require_full as require_full,
 )
 from .build import build_bank as build_bank
-from .compatibility import check_fits as check_fits
+from .compatibility import check_fits as check_fits, gray_differences as gray_differences
 from .contact_sheets import contact_sheet as contact_sheet
 from .contents import (
     contents_of as contents_of,

@@ -18,6 +18,9 @@ is compared by nobody.
 """
 
 
+LIGHT_FIELDS = ("f1_hz", "f2_hz", "sample_period_s", "harmonic_strength", "highest_harmonic")
+"""Of these, fields that the gray images have no part in."""
+
 THINNED_FIELDS = ("max_range_m",)
 """Fields that a thinned bank's scene features were made with; a rendered bank's are made anew."""
 
@@ -61,3 +64,15 @@ def check_fits(bank: Bank, sensor: SensorConfig, *, frame_rate_hz: float | None 
             f"frame_rate_hz is {frame_rate_hz:g}, but bank {bank.name} was rendered at "
             f"{rendered_hz:g}; ask for that, or render a bank at this frame rate"
         )
+
+
+def gray_differences(bank: Bank, sensor: SensorConfig) -> tuple[str, ...]:
+    """Fields by which a bank's gray images differ from a sensor's; none of an imported bank."""
+    if bank.config is None:
+        return ()
+    own = bank.config.sensor
+    return tuple(
+        field
+        for field in BAKED_FIELDS
+        if field not in LIGHT_FIELDS and getattr(own, field) != getattr(sensor, field)
+    )

@@ -8,5 +8,10 @@ from .export_inputs import (
 )
 from .sensed_frames import SensedFrames as SensedFrames
 from .signal_statistics import light_statistics as light_statistics, print_light as print_light
-from .source import bench_config as bench_config, sources as sources
+from .source import (
+    bench_config as bench_config,
+    for_sensor as for_sensor,
+    gray_warning as gray_warning,
+    sources as sources,
+)
 from .thinning import thin_bank as thin_bank

@@ -59,11 +59,13 @@ class SensedFrames:
         Every how many rows and columns are used.
     remembers : bool
         Whether frames with samples come with the depth of the frame before.
+    gray_only : bool
+        Frames are only asked for without samples, so that a bank of another sensor will do.
 
     Raises
     ------
     ValueError
-        The bank was rendered for another sensor, or is thinned.
+        The bank was rendered for another sensor, now or as samples are asked for; or is thinned.
     """
 
     def __init__(
@@ -76,9 +78,11 @@ class SensedFrames:
         truth: TruthOf = "rendered",
         stride: int = 1,
         remembers: bool = False,
+        gray_only: bool = False,
     ) -> None:
         require_full(bank, "training and judging networks")
-        check_fits(bank, config.sensor)
+        if not gray_only:
+            check_fits(bank, config.sensor)
         self.bank, self.frames, self.range_m = bank, frames, range_m
         self.truth_of, self.stride, self.remembers = truth, stride, remembers
         # Of a drive only the sensor is used, not its course: its frames are drawn in vain.
@@ -167,6 +171,7 @@ class SensedFrames:
         gray = words.to(torch.float32) / GRAY_FULL_SCALE
         if shots is None:
             return Sensed(gray)
+        check_fits(self.bank, sensor)
         exposure, drive = self._exposure(frames), self._drives(frames, draw)
         # Noise follows from the drive and the place in the clip, so not from the batch.
         places = (frames - self._starts(frames)).tolist()

@@ -86,5 +86,5 @@ def test_what_is_measured_becomes_tables_beside_the_file(script, tmp_path, monke
 
 
 def test_a_page_without_a_place_for_the_tables_is_named(script):
-    with pytest.raises(ValueError, match="has 0 places for the tables"):
+    with pytest.raises(ValueError, match="has 0 places for the table"):
         script.filled("# Policies\n", {"rows": []} | json.loads(script.KEPT.read_text()))

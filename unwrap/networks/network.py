@@ -93,11 +93,14 @@ class Network(nn.Module):
     ----------
     needs : "gray" or "samples"
         What of a frame it looks at.
+    uses_classes : bool
+        Whether it tells wraps apart, of which it must have as many as there are in the range.
     can_be_traced : bool
         Whether the forward pass of one shape is a fixed chain of operations that torch can record.
     """
 
     needs: ClassVar[Needs] = "gray"
+    uses_classes: ClassVar[bool] = True
     can_be_traced: ClassVar[bool] = True
 
     def __init__(self, settings: Settings):

@@ -26,6 +26,8 @@ class TofRegNet(GrayNetwork):
         Modulation frequency whose wraps are told apart.
     """
 
+    uses_classes = False
+
     def __init__(self, width: int = 64, range_m: float = 30.0, f1_hz: float = 24e6):
         super().__init__(Settings(width=width, range_m=range_m, f1_hz=f1_hz), 1)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 import torch
@@ -16,9 +17,12 @@ from unwrap.networks import (
     load_unwrapper,
     network_class,
 )
-from unwrap.signal import Shots
+from unwrap.signal import SensorDescription, Shots, unambiguous_range_m
 from unwrap.support import Section
 from unwrap.training.data import Augmentation, SplitBy
+
+MOST_CLASSES, BEYOND = 16, 1.2
+"""Wrap classes of a network; truth that is told apart, over the scored range."""
 
 
 class TrainConfig(Section):
@@ -29,7 +33,10 @@ class TrainConfig(Section):
     split_by: SplitBy = Field(
         "clip", description="whole clips, or the paper's random split of frames"
     )
-    sensor: str = Field("epc660", description="name or path of the sensor that looks at the bank")
+    sensor: str = Field(
+        "epc660",
+        description="name or path of the sensor that the network is for: its frequency and ranges",
+    )
     truth: Literal["rendered", "measured"] = Field(
         "rendered", description="learn the rendered distance, or the sensor's own of 8 DCS"
     )
@@ -39,7 +46,7 @@ class TrainConfig(Section):
     )
     memory: bool = Field(False, description="give toffusionnet the depth of the frame before")
     width: int = Field(32, ge=4, le=128, description="channels of the first ResNet stage")
-    classes: int = Field(5, ge=2, le=16, description="wrap classes of tofsegnet")
+    classes: int = Field(5, ge=2, le=MOST_CLASSES, description="wrap classes of tofsegnet")
     f1_hz: float = Field(24e6, gt=0, description="frequency whose wraps are predicted, Hz")
     max_range_m: float = Field(25.0, gt=0, description="range that is scored, m")
     clamp_m: float = Field(30.0, gt=0, description="truth beyond, and the sky, counts as this, m")
@@ -87,6 +94,50 @@ class TrainConfig(Section):
         return Augmentation(
             self.flip_horizontal, self.flip_vertical, self.contrast, self.brightness
         )
+
+    def at_sensor(self, sensor: SensorDescription) -> TrainConfig:
+        """With the frequency, the ranges and the classes of a sensor, where none is chosen here.
+
+        What has its default value counts as not chosen. Classes are one for each wrap within the
+        scored range; of a network that has no classes they stay as they are.
+
+        Raises
+        ------
+        ValueError
+            A network that looks at samples is to be of another frequency than its samples; or
+            the scored range has more wraps than a network has classes.
+
+        Examples
+        --------
+        >>> sensor = SensorDescription(f1_hz=60e6, f2_hz=25e6, max_range_m=20.0)
+        >>> config = TrainConfig(network="tofsegnet").at_sensor(sensor)
+        >>> config.f1_hz, config.max_range_m, config.clamp_m, config.classes
+        (60000000.0, 20.0, 24.0, 9)
+        """
+        follow = {"f1_hz": sensor.f1_hz, "max_range_m": sensor.max_range_m}
+        found = self._where_unchosen(follow)
+        if found.shown_shots and found.f1_hz != sensor.f1_hz:
+            raise ValueError(
+                f"f1_hz is {found.f1_hz:g}, but sensor {self.sensor} samples at {sensor.f1_hz:g}, "
+                f"and {self.network} looks at samples; expected that, or another sensor"
+            )
+        found = found._where_unchosen({"clamp_m": BEYOND * found.max_range_m})
+        if not network_class(self.network).uses_classes:
+            return found
+        classes = math.floor(found.max_range_m / unambiguous_range_m(found.f1_hz)) + 1
+        if classes > MOST_CLASSES and found.classes == TrainConfig().classes:
+            raise ValueError(
+                f"max_range_m is {found.max_range_m:g}, within which {classes} wraps of "
+                f"{unambiguous_range_m(found.f1_hz):.3g} m begin; expected at most {MOST_CLASSES}, "
+                "or a network without classes, such as tofregnet"
+            )
+        return found._where_unchosen({"classes": classes})
+
+    def _where_unchosen(self, values: dict[str, float]) -> TrainConfig:
+        """A copy with the `values` of those fields that have their default."""
+        fields = TrainConfig.model_fields
+        new = {name: v for name, v in values.items() if getattr(self, name) == fields[name].default}
+        return TrainConfig(**{**self.model_dump(), **new})
 
     def build(self) -> Network:
         """The network, with weights drawn from `seed`."""

@@ -41,6 +41,7 @@ class AgrestiNet(Network):
     """
 
     needs = "samples"
+    uses_classes = False
 
     def __init__(self, settings: Settings):
         super().__init__(settings)

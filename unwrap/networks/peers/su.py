@@ -39,6 +39,7 @@ class SuNet(Network):
     """
 
     needs = "samples"
+    uses_classes = False
 
     def __init__(self, settings: Settings):
         super().__init__(settings)
