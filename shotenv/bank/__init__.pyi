@@ -3,6 +3,7 @@ from .bank import (
     BankFrame as BankFrame,
     Clip as Clip,
     RenderedBank as RenderedBank,
+    TruthLevel as TruthLevel,
     require_full as require_full,
 )
 from .build import build_bank as build_bank
@@ -32,6 +33,5 @@ from .thinned import (
 )
 from .word_bank import (
     ClipSettings as ClipSettings,
-    TruthLevel as TruthLevel,
     WordBank as WordBank,
 )

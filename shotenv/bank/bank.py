@@ -18,8 +18,12 @@ from shotenv.bank.layout import ARRAYS, BankError, Manifest, TableOfContents
 from shotenv.bank.store import read_manifest
 from shotenv.config import TRAINING_FAMILIES, Split
 from shotenv.sensor import Exposure
+from unwrap.signal import Shots
 from unwrap.training import RANDOM_SPLITS, random_split
 
+TruthLevel = Literal["external", "own", "none"]
+"""What distances are scored against: a reference; the depth of a camera's own eight samples where
+its two frequencies agree; or nothing."""
 OPEN_CLIPS = 128
 """Clips of a bank that are mapped at a time: with five arrays each, 640 of the usual 1024 files."""
 
@@ -162,6 +166,16 @@ class Bank(ABC):
     def width(self) -> int:
         """Pixels across."""
         return self.manifest.width
+
+    @property
+    def answers(self) -> tuple[Shots, ...]:
+        """Acquisitions that frames can be taken with, ascending; of light all."""
+        return tuple(Shots)
+
+    @property
+    def truth_level(self) -> TruthLevel:
+        """What distances are scored against; rendered light knows."""
+        return "external"
 
     @property
     def fingerprint(self) -> str:
