@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from shotenv.bank.bank import Bank, Clip, TruthLevel
-from shotenv.bank.layout import BankError
+from shotenv.bank.bank import Bank, Clip
+from shotenv.bank.layout import BankError, TruthLevel
 from shotenv.sensor import Exposure
 from unwrap.signal import RawFrame, Shots
 

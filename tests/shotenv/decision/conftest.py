@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from word_banks import record, replayed_problem
 
 from shotenv.config.keywords import env_config
 from shotenv.decision.problem import open_problem
-from tests.helpers.word_banks import record, replayed_problem
 
 
 @pytest.fixture(scope="session")

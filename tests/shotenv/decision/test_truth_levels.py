@@ -8,11 +8,11 @@ import statistics
 
 import pytest
 import torch
+from word_banks import replayed_problem
 
 from shotenv.decision.acquire import acquire_depth
 from shotenv.decision.outcomes import outcomes_of_all_actions
 from shotenv.decision.transition import drive_of_seed, reset, step
-from tests.helpers.word_banks import replayed_problem
 from unwrap.depth.correction import correct
 from unwrap.signal.shots import Shots
 

@@ -6,6 +6,7 @@ import dataclasses
 
 import pytest
 import torch
+from word_banks import HeldWords, replayed_problem
 
 from shotenv.bank.layout import BankError
 from shotenv.decision.acquire import acquire_depths
@@ -14,7 +15,6 @@ from shotenv.decision.measurement_cache import MeasurementCache
 from shotenv.decision.problem import problem_of
 from shotenv.decision.state import observe
 from shotenv.decision.transition import allowed_actions, drive_of_seed, reset, step
-from tests.helpers.word_banks import HeldWords, replayed_problem
 from unwrap.signal.shots import Shots
 
 SEEDS = (5, 6, 2**61 + 7)
