@@ -17,7 +17,7 @@ from agents.cli.command import (
     section_of,
     write_numbers,
 )
-from shotenv.config import BankConfig, ConfigError
+from shotenv.config import BankConfig, ConfigError, find_config
 from unwrap.support import progress, say, write_bytes
 
 
@@ -62,11 +62,11 @@ def info_arguments(parser: ArgumentParser) -> None:
 
 def tell_about_banks(arguments: Namespace) -> int:
     """Tell what is in a bank, or which banks there are."""
-    from shotenv.bank import (
+    from shotenv.bank import open_bank
+    from shotenv.bank.listing import (
         contact_sheet,
         contents_of,
         known_banks,
-        open_bank,
         print_banks,
         print_contents,
     )
@@ -130,7 +130,8 @@ def thin_arguments(parser: ArgumentParser) -> None:
 
 def write_thinned_bank(arguments: Namespace) -> int:
     """Make a thinned bank of a rendered one."""
-    from shotenv.bank import contents_of, open_bank, print_contents
+    from shotenv.bank import open_bank
+    from shotenv.bank.listing import contents_of, print_contents
     from shotenv.dataset import thin_bank
 
     bank = open_bank(arguments.bank)
@@ -146,6 +147,42 @@ def write_thinned_bank(arguments: Namespace) -> int:
         )
     about = contents_of(thinned)
     print_contents(about)
+    write_numbers(arguments, about)
+    return DONE
+
+
+def import_arguments(parser: ArgumentParser) -> None:
+    """Which recordings of which camera, and where to."""
+    parser.add_argument("folder", type=Path, help="folder of recordings, and recordings.yaml")
+    parser.add_argument("--camera", required=True, help="name or path of a camera's description")
+    parser.add_argument("--sensor", default="epc660", help="name or path of a sensor configuration")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write")
+    parser.add_argument(
+        "--truth",
+        choices=["external", "own", "none"],
+        help="what distances are scored against: references that recordings.yaml names, the depth "
+        "of the eight samples, or nothing; the first that can be had",
+    )
+    add_json(parser)
+
+
+def import_recordings(arguments: Namespace) -> int:
+    """Make a bank of a camera's recordings."""
+    from agents.cli.camera_commands import read_camera
+    from shotenv.bank.listing import contents_of, print_contents
+    from shotenv.recorded import import_bank
+
+    camera, _ = read_camera(arguments.camera)
+    bank = import_bank(
+        arguments.folder,
+        camera,
+        find_config("sensor", arguments.sensor),
+        arguments.out,
+        truth=arguments.truth,
+    )
+    about = contents_of(bank)
+    print_contents(about)
+    print(f"{bank.folder / 'env.yaml'}: an environment that plays it")
     write_numbers(arguments, about)
     return DONE
 
@@ -193,6 +230,12 @@ COMMANDS = (
         render_arguments,
         render_bank,
         resumes=True,
+    ),
+    Command(
+        "bank import",
+        "make a bank of a camera's recordings",
+        import_arguments,
+        import_recordings,
     ),
     Command(
         "bank info",

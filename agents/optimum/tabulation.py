@@ -18,7 +18,8 @@ from shotenv.decision import (
     Drive,
     Outcomes,
     Problem,
-    draw_drive,
+    answered_actions,
+    drive_of_seed,
     outcomes_of_all_actions,
     weighted,
 )
@@ -84,6 +85,8 @@ class Possible:
         # price is relative to the energy of always 8 DCS.
         laser_j = heat_j / (1.0 - laser.efficiency)
         whole_j = np.array([float(drive.always_eight.energy_j) for drive in self.drives])
+        # What was not recorded cannot be chosen.
+        cost[..., ~answered_actions(self.problem).numpy()] = np.inf
         return DriveTable(
             cost=cost,
             reference=reference,
@@ -130,15 +133,7 @@ def drive_of(problem: Problem, seed: int) -> Drive:
     """The first drive of an environment after `reset(seed=seed)`."""
     # Gymnasium's own way from a seed to the generator of an environment, then the environment's.
     generator, _ = seeding.np_random(seed)
-    bank, config = problem.bank, problem.config
-    return draw_drive(
-        drive_seed(generator),
-        config,
-        problem.clips,
-        bank.height,
-        bank.width,
-        network=problem.network_work,
-    )
+    return drive_of_seed(problem, drive_seed(generator))
 
 
 def frames_of(drives: Sequence[Drive]) -> np.ndarray:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from unwrap.cameras.camera_frames import CameraFrames, as_tensor
-from unwrap.cameras.canonical import canonical
+from unwrap.cameras.canonical import canonical, in_order
 from unwrap.cameras.files import (
     GRAY,
     ArrayFrames,
@@ -86,18 +86,22 @@ class CameraRecording:
         camera, where = self.camera, str(self.source.path)
         stored, names = self._without_gray_plane(start, stop), self.names[start:stop]
         samples, saturated = samples_of(stored.planes, camera, where, names)
+        if stored.saturated is not None:
+            saturated = saturated | stored.saturated
         frequencies = self._frequencies(stored)
         by_frequency = samples.reshape(len(names), len(frequencies), -1, *samples.shape[2:])
         ordered, made = canonical(by_frequency, camera.samples)
+        full = in_order(saturated.reshape(by_frequency.shape), camera.samples)
         descending = sorted(range(len(frequencies)), key=lambda k: -frequencies[k])
         gray = self._gray(stored, start, stop)
         return CameraFrames(
             as_tensor(_turned(ordered[:, descending], camera.axes)),
-            as_tensor(_turned(saturated, camera.axes)),
+            as_tensor(_turned(np.any(saturated, axis=1), camera.axes)),
             None if gray is None else as_tensor(_turned(gray, camera.axes)),
             tuple(frequencies[k] for k in descending),
             made,
             names,
+            saturated_samples=as_tensor(_turned(full[:, descending], camera.axes)),
             **{name: self._told(stored, name, names) for name in BESIDE},
         )
 
@@ -106,7 +110,13 @@ class CameraRecording:
         stored, passive = self.source.read(start, stop), self.camera.passive
         if passive.where == "plane" and passive.plane is not None:
             gray = stored.planes[:, passive.plane]
-            return replace(stored, planes=np.delete(stored.planes, passive.plane, 1), gray=gray)
+            flags = stored.saturated
+            return replace(
+                stored,
+                planes=np.delete(stored.planes, passive.plane, 1),
+                saturated=None if flags is None else np.delete(flags, passive.plane, 1),
+                gray=gray,
+            )
         if stored.gray is not None and passive.where != "recording":
             raise ValueError(
                 f"{self.source.path}: gray images are in the recording; expected none, as "
