@@ -168,7 +168,7 @@ def import_arguments(parser: ArgumentParser) -> None:
 
 def import_recordings(arguments: Namespace) -> int:
     """Make a bank of a camera's recordings."""
-    from agents.cli.camera_commands import read_camera
+    from agents.cli.cameras import read_camera
     from shotenv.bank.listing import contents_of, print_contents
     from shotenv.recorded import import_bank
 
