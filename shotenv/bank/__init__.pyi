@@ -15,7 +15,12 @@ from .contents import (
     print_contents as print_contents,
 )
 from .folders import cache_dir as cache_dir
-from .layout import BankError as BankError, ClipFacts as ClipFacts, StoredNetwork as StoredNetwork
+from .layout import (
+    BankError as BankError,
+    ClipFacts as ClipFacts,
+    StoredNetwork as StoredNetwork,
+    TableOfContents as TableOfContents,
+)
 from .opening import find_thinned as find_thinned, open_bank as open_bank
 from .predictions import (
     KeptPredictions as KeptPredictions,
