@@ -1,7 +1,7 @@
 """A camera on the loopback that speaks the epc660's wire format: frames that were made up before.
 
-What the maker's open toolkit (epc-tofcam-toolkit) tells of commands and images is marked [src]; what is
-marked [assumed] has no source. Nothing here is shared with the client, which reads this format.
+What the maker's open toolkit (epc-tofcam-toolkit) tells of commands and images is marked [src];
+what is marked [assumed] has no source. Nothing here is shared with the client.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import struct
 import threading
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,10 +98,8 @@ class EmulatedCamera:
         for each in (self._connection, self._listener):
             if each is not None:
                 # Wakes a thread that waits for it, which closing alone would not.
-                try:
+                with suppress(OSError):  # Already gone.
                     each.shutdown(socket.SHUT_RDWR)
-                except OSError:
-                    pass  # Already gone.
                 each.close()
         self._thread.join()
 
@@ -113,10 +112,8 @@ class EmulatedCamera:
                 return  # Closed.
             with self._connection as connection:
                 connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                try:
+                with suppress(OSError):  # The client left.
                     self._converse(connection)
-                except OSError:
-                    pass  # The client left.
 
     def _converse(self, connection: socket.socket) -> None:
         while head := _exactly(connection, FRAMED.size):

@@ -1,14 +1,14 @@
 """An epc660 camera (TOFcam660) on the network: frames in its wire format, on demand.
 
-Where a line is marked [src], the maker's open toolkit (epc-tofcam-toolkit) does it that way; what is
-marked [assumed] has no source here and was never tried on a camera. A command is
+Where a line is marked [src], the maker's open toolkit (epc-tofcam-toolkit) does it that way; what
+is marked [assumed] has no source here and was never tried on a camera. A command is
 
     0xffffaa55, length, payload of 34 bytes, 0xffff55aa                       [src]
 
-with the payload's first two bytes the number of the command; the answer has the same frame, its first
-byte 0 for done and 4 for a temperature [src]. All numbers are big-endian, but for the words of
-images. Where an image was asked for it follows the answer on the same connection [assumed; older
-cameras send it by UDP].
+with the number of the command in the payload's first two bytes. The answer has the same frame, its
+first byte 0 for done and 4 for a temperature [src]. All numbers are big-endian, but for the words
+of images. Where an image was asked for, it follows the answer on the same connection [assumed;
+older cameras send it by UDP].
 """
 
 from __future__ import annotations

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
 
-import numpy as np
 import torch
 from torch import Tensor
 
@@ -147,6 +146,4 @@ def _contents(camera: Camera, frames: int) -> TableOfContents:
         yaw_rate_rad_s=unknown,
         gray_exposure_s=unknown,
     )
-    return TableOfContents(
-        name=camera.name, height=height, width=width, config=None, clips=(clip,)
-    )
+    return TableOfContents(name=camera.name, height=height, width=width, config=None, clips=(clip,))

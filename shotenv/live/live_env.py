@@ -74,10 +74,11 @@ def keep_nothing(depth: DepthFrame, shots: Shots) -> None:
 class LiveShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
     """`ShotScheduleEnv` with a camera in place of a bank.
 
-    Observation, masks, heat and energy are those of a drive in a bank: the same features of the gray
-    image and of what samples told, the same model of the laser. There is no truth, so that only
-    energy, duty and heat make the reward. `step` takes the samples of the frame whose gray image was
-    observed, and returns when the next gray image is there: it never runs ahead of the camera.
+    Observation, masks, heat and energy are those of a drive in a bank: the same features of the
+    gray image and of what samples told, the same model of the laser. There is no truth, so that
+    energy, duty and heat alone make the reward. `step` takes the samples of the frame whose gray
+    image was observed, and returns when the next gray image is there: it never runs ahead of the
+    camera.
 
     The camera is closed by `close`, at the end of a `with` block, and by every error.
 

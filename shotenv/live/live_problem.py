@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import torch
 from torch import Tensor
 
 from shotenv.bank import Clip, KeptPredictions
 from shotenv.config import EnvConfig
 from shotenv.decision import (
+    SCORES,
     SEEN_FEATURES,
     Acquisition,
+    DepthScore,
     Drive,
     Measurement,
     Problem,
     acquire_depths,
     look_at_scenes,
-    no_depth,
     told_by,
 )
 from shotenv.laser import NetworkWork
@@ -27,7 +26,7 @@ from unwrap.networks import Unwrapper
 from unwrap.signal import Shots
 
 Networks = tuple[Unwrapper, Unwrapper | None]
-"""The one that looks at the gray image alone, and the one that needs samples, where it is chosen."""
+"""The one that looks at the gray image alone; the one that needs samples, where it is chosen."""
 
 
 def live_problem(bank: LiveBank, config: EnvConfig, networks: Networks) -> Problem:
