@@ -26,6 +26,7 @@ from .problem import (
     Problem as Problem,
     load_networks as load_networks,
     open_problem as open_problem,
+    problem_of as problem_of,
 )
 from .rewards import TERMS as TERMS, weighted as weighted
 from .scenes import (
@@ -38,6 +39,8 @@ from .state import State as State, observe as observe
 from .transition import (
     Outcome as Outcome,
     allowed_actions as allowed_actions,
+    answered_actions as answered_actions,
+    drive_of_seed as drive_of_seed,
     reset as reset,
     step as step,
 )
