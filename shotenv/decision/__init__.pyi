@@ -24,6 +24,7 @@ from .measurement_cache import MeasurementCache as MeasurementCache
 from .outcomes import Outcomes as Outcomes, outcomes_of_all_actions as outcomes_of_all_actions
 from .problem import (
     Problem as Problem,
+    check_settings as check_settings,
     load_networks as load_networks,
     open_problem as open_problem,
     problem_of as problem_of,

@@ -133,6 +133,7 @@ class LiveShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
         self.action_space = spaces.Discrete(ACTIONS)
         self.reward_space = term_space()
         self.state: State | None = None
+        self._left_k: float | None = None  # Of the laser, when last heard of.
         self.times = FrameTimes(*(math.nan,) * 4)
 
     def reset(
@@ -157,7 +158,7 @@ class LiveShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
         with self._closing():
             self.camera.start()
             settings = self._settings(self.camera.temperature_k())
-            if self.state is None:
+            if self._left_k is None:
                 # Compiling loops takes longer than a camera waits.
                 warm_up(self.config, self._networks, settings, self.camera.size)
             frames = self.config.frames_per_drive + 1
@@ -167,7 +168,7 @@ class LiveShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
             self.problem = live_problem(bank, self.config, self._networks)
             self._codes = family_codes(bank)
             chosen = check_options(options, self.problem, also=("laser_k",))
-            laser_k = self._laser_k(options or {}, settings.ambient_k)
+            laser_k = self._left_k = self._laser_k(options or {}, settings.ambient_k)
             begun = reset(self.problem, chosen.seeds or (drive_seed(self.np_random),), chosen.drive)
             warmth = start_laser(torch.full_like(begun.drive.start_k, laser_k))
             state = self.state = replace(begun, laser=warmth)
@@ -192,7 +193,7 @@ class LiveShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
             raise gymnasium.error.ResetNeeded("no drive is under way; call reset() first")
         with self._closing():
             after, outcome = step(self.problem, before, chosen, measure=self._measure)
-            self.state = after
+            self.state, self._left_k = after, float(after.laser.temperature_k)
             self._next_frame()
         columns = info_columns(self.problem, self._codes, before, after, outcome)
         truncated = bool(outcome.truncated)
@@ -210,10 +211,11 @@ class LiveShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
 
     @contextmanager
     def _closing(self) -> Iterator[None]:
-        """Close the camera where something fails: nobody else will."""
+        """End the drive and close the camera where something fails: nobody else will."""
         try:
             yield
         except BaseException:
+            self.state = None
             self.close()
             raise
 
@@ -235,7 +237,7 @@ class LiveShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
             lowest, highest = COLDEST_K, self.config.laser.trip_k
             return check_number("laser_k", options["laser_k"], lowest, highest, "K")
         # As the last drive left it, however long ago that was: too warm rather than too cold.
-        return ambient_k if self.state is None else float(self.state.laser.temperature_k)
+        return ambient_k if self._left_k is None else self._left_k
 
     def _next_frame(self) -> None:
         self._bank.next_frame()

@@ -16,6 +16,7 @@ from shotenv.decision import (
     Measurement,
     Problem,
     acquire_depths,
+    check_settings,
     look_at_scenes,
     told_by,
 )
@@ -30,7 +31,14 @@ Networks = tuple[Unwrapper, Unwrapper | None]
 
 
 def live_problem(bank: LiveBank, config: EnvConfig, networks: Networks) -> Problem:
-    """The problem of a drive that has not begun; `look` fills in what is seen of each frame."""
+    """The problem of a drive that has not begun; `look` fills in what is seen of each frame.
+
+    Raises
+    ------
+    BankError
+        The configuration's laser or sensor cannot be in use as the camera is.
+    """
+    check_settings(bank, bank.clips, config)
     gray, fusion = networks
     size = bank.height, bank.width
     # One frame's memory stands for all: none but the last is looked at.
@@ -54,16 +62,17 @@ def live_problem(bank: LiveBank, config: EnvConfig, networks: Networks) -> Probl
 
 def look(problem: Problem, bank: LiveBank, gray: Unwrapper) -> None:
     """Predict the frame that is there, and write down what is seen of it."""
-    number = bank.number
+    number, kept = bank.number, problem.kept
+    assert isinstance(kept, KeptPredictions)  # As `live_problem` has made them.
     predicted = gray.predict(bank.gray(torch.tensor([number])))
     # Rounded as predictions of banks are kept, so that a replay of the recorded drive is the same.
     for maps, found in (
-        (problem.kept.distance_m, predicted.distance_m),
-        (problem.kept.confidence, predicted.confidence),
+        (kept.distance_m, predicted.distance_m),
+        (kept.confidence, predicted.confidence),
     ):
         maps[:1].copy_(found)
     now = Clip(FAMILY, FAMILY, 0, "test", number, 1)
-    seen = look_at_scenes(bank, (now,), problem.kept, problem.config.sensor)
+    seen = look_at_scenes(bank, (now,), kept, problem.config.sensor)
     for rows, found in (
         (problem.scenes.features, seen.features),
         (problem.scenes.log_ambient, seen.log_ambient),

@@ -9,11 +9,26 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from shotenv.decision.acquire import noise_of
+from shotenv.config import find_config, read_config
+from shotenv.decision import noise_of
+from shotenv.live import EpcCamera
 from shotenv.sensor import acquire_prefixes, incident_light
+from unwrap.cameras.files import CameraDescription
 from unwrap.signal import Shots
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def client_of(server, laser_power_w=5.0, integration_s=4e-4, **changes):
+    """The client of an emulated camera of 24 x 32 pixels."""
+    told = {
+        "description": read_config(CameraDescription, find_config("camera", "epc660_wire")),
+        "frequencies_hz": (24e6, 10e6),
+        "laser_power_w": laser_power_w,
+        "integration_s": integration_s,
+        "size": (24, 32),
+    }
+    return EpcCamera("127.0.0.1", server.port, **(told | changes))
 
 
 def example_module(name):
