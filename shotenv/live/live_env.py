@@ -106,6 +106,7 @@ class LiveShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012
+    feature_names = FEATURE_NAMES
 
     def __init__(
         self,
@@ -128,7 +129,6 @@ class LiveShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
         self._shift_m, self._ego, self._deliver = shift_m, ego, deliver
         self._stale_s = 1.0 / self.config.frame_rate_hz if stale_s is None else stale_s
         self._networks = load_networks(self.config.unwrapper, description_of(self.config.sensor))
-        self.feature_names = FEATURE_NAMES
         self.observation_space = feature_space()
         self.action_space = spaces.Discrete(ACTIONS)
         self.reward_space = term_space()
