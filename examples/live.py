@@ -84,7 +84,9 @@ def blocks() -> list[Block]:
         Block((-4.0, 0.35, 24.0), (0.25, 0.85, 0.2), 0.4, 1.4),
         Block((9.0, 0.35, 66.0), (0.25, 0.85, 0.2), 0.4, -1.4),
     ]
-    return cars + people
+    # Above the tunnel's mouths.
+    fronts = [Block((0.0, -5.5, z), (WALLS_M, 2.5, 0.3), 0.3) for z in TUNNEL_M]
+    return cars + people + fronts
 
 
 def rays(size: tuple[int, int]) -> np.ndarray:
@@ -105,8 +107,9 @@ def seen(directions: np.ndarray, time_s: float) -> tuple[np.ndarray, np.ndarray,
         ground_m = np.where(down > 0, CAMERA_HEIGHT_M / down, np.inf)
         walls_m = WALLS_M / np.abs(right)
         ceiling_m = np.where(down < 0, CEILING_M / -down, np.inf)
-    # Walls end at their height, but for the tunnel's; its ceiling is there alone.
-    walls_m[(walls_m * -down > WALL_HEIGHT_M) & ~within(at_m + walls_m * ahead)] = np.inf
+    # A tunnel's walls end at its ceiling, which is there alone.
+    height_m = np.where(within(at_m + walls_m * ahead), CEILING_M, WALL_HEIGHT_M)
+    walls_m[walls_m * -down > height_m] = np.inf
     ceiling_m[~within(at_m + ceiling_m * ahead)] = np.inf
     found = np.stack([ground_m, walls_m, ceiling_m])
     albedo = np.choose(found.argmin(axis=0), (0.2, 0.35, 0.3))

@@ -156,11 +156,12 @@ class LiveShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
         """
         super().reset(seed=seed)
         with self._closing():
+            if self._left_k is None:
+                # Compiling loops and networks takes longer than a camera waits.
+                usual = self._settings(self.config.sensor.calibration_temperature_k)
+                warm_up(self.config, self._networks, usual, self.camera.size)
             self.camera.start()
             settings = self._settings(self.camera.temperature_k())
-            if self._left_k is None:
-                # Compiling loops takes longer than a camera waits.
-                warm_up(self.config, self._networks, settings, self.camera.size)
             frames = self.config.frames_per_drive + 1
             self._bank = bank = LiveBank(
                 self.camera, frames, settings, ego=self._ego, stale_s=self._stale_s
