@@ -35,7 +35,7 @@ from .scenes import (
     look_at_scenes as look_at_scenes,
     probe_features as probe_features,
 )
-from .score import SCORES as SCORES, DepthScore as DepthScore, no_depth as no_depth
+from .score import no_depth as no_depth, unscored as unscored
 from .state import State as State, observe as observe
 from .transition import (
     Outcome as Outcome,

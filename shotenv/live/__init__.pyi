@@ -1,4 +1,6 @@
-from .camera import (
+from .epc_camera import EpcCamera as EpcCamera
+from .live_bank import Ego as Ego, LiveBank as LiveBank
+from .live_camera import (
     Camera as Camera,
     CameraDisconnectedError as CameraDisconnectedError,
     CameraError as CameraError,
@@ -9,6 +11,4 @@ from .camera import (
     StaleFrameError as StaleFrameError,
     TruncatedFrameError as TruncatedFrameError,
 )
-from .epc_camera import EpcCamera as EpcCamera
-from .live_bank import Ego as Ego, LiveBank as LiveBank
 from .live_env import FrameTimes as FrameTimes, LiveShotScheduleEnv as LiveShotScheduleEnv

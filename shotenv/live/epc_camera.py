@@ -24,7 +24,7 @@ from typing import Final
 import numpy as np
 import torch
 
-from shotenv.live.camera import (
+from shotenv.live.live_camera import (
     CameraDisconnectedError,
     CameraTimeoutError,
     DamagedFrameError,
@@ -173,13 +173,10 @@ class EpcCamera:
                 f"{self.name}: integration time of the {what} is {integration_us} us; expected "
                 f"{self._integration_us} us, as was set"
             )
-        # Plane by plane, as if each were a frame: which sample is full must not be lost.
         with self._as_damaged():
-            samples, saturated = samples_of(
-                planes[:, None], camera, self.name, [f"now, sample {k}" for k in range(count)]
-            )
+            samples, saturated = samples_of(planes[None], camera, self.name, ("now",))
         order = np.argsort(camera.samples.phases_deg[:count])
-        return turned(samples[order, 0], camera.axes), turned(saturated[order], camera.axes)
+        return turned(samples[0, order], camera.axes), turned(saturated[0, order], camera.axes)
 
     @contextmanager
     def _as_damaged(self) -> Iterator[None]:

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from shotenv.bank import Clip, ClipFacts, ClipSettings, TableOfContents, TruthLevel, WordBank
-from shotenv.live.camera import Camera, Samples, StaleFrameError
+from shotenv.live.live_camera import Camera, Samples, StaleFrameError
 from unwrap.signal import RawFrame, Shots
 
 Ego = Callable[[], tuple[float, float]]

@@ -43,8 +43,8 @@ from shotenv.env import (
     term_space,
 )
 from shotenv.laser import start_laser
-from shotenv.live.camera import Camera
 from shotenv.live.live_bank import Ego, LiveBank, standing
+from shotenv.live.live_camera import Camera
 from shotenv.live.live_problem import live_problem, look, measure_live
 from shotenv.live.warm_up import warm_up
 from shotenv.sensor import description_of
@@ -253,9 +253,9 @@ class LiveShotScheduleEnv(gymnasium.Env[np.ndarray, np.int64]):
         """As `measure_live`, and hands over the depth."""
         chosen_s = time.perf_counter()
         measured, taken = measure_live(problem, drive, step, shots, power_w)
-        self.times = FrameTimes(
-            self._bank.gray_s, chosen_s, self._bank.samples_s, time.perf_counter()
-        )
+        # Without laser no samples come: they are there when that is chosen.
+        samples_s = max(chosen_s, self._bank.samples_s)
+        self.times = FrameTimes(self._bank.gray_s, chosen_s, samples_s, time.perf_counter())
         if taken is not None:
             self._deliver(taken.depth, taken.raw.shots)
         return measured

@@ -8,10 +8,8 @@ from torch import Tensor
 from shotenv.bank import Clip, KeptPredictions
 from shotenv.config import EnvConfig
 from shotenv.decision import (
-    SCORES,
     SEEN_FEATURES,
     Acquisition,
-    DepthScore,
     Drive,
     Measurement,
     Problem,
@@ -19,6 +17,7 @@ from shotenv.decision import (
     check_settings,
     look_at_scenes,
     told_by,
+    unscored,
 )
 from shotenv.laser import NetworkWork
 from shotenv.live.live_bank import FAMILY, LiveBank
@@ -87,11 +86,9 @@ def measure_live(
 
     There is no truth: the error term is 0, whatever is taken, and measures of depth are NaN.
     """
-    nothing = torch.zeros(1, dtype=torch.float64)
-    score = DepthScore(nothing, *(nothing + torch.nan for _ in SCORES[1:]))
-    count = int(shots)
+    nothing, count = unscored(1), int(shots)
     if not count:
-        return Measurement(score, nothing, torch.zeros(1, len(SEEN_FEATURES))), None
+        return Measurement(nothing, nothing.error, torch.zeros(1, len(SEEN_FEATURES))), None
     counts = [fewer for fewer in Shots if fewer <= count]
     taken = acquire_depths(problem, drive, step, counts, power_w)
-    return Measurement(score, nothing, told_by(problem, taken)), taken[-1]
+    return Measurement(nothing, nothing.error, told_by(problem, taken)), taken[-1]

@@ -7,8 +7,8 @@ import torch
 from shotenv.bank import ClipSettings
 from shotenv.config import EnvConfig
 from shotenv.decision import Measurement, observe, reset, step
-from shotenv.live.camera import GrayFrame, Samples
 from shotenv.live.live_bank import LiveBank
+from shotenv.live.live_camera import GrayFrame, Samples
 from shotenv.live.live_problem import Networks, live_problem, look, measure_live
 from unwrap.signal import GRAY_FULL_SCALE, Shots
 

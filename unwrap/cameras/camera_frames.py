@@ -34,6 +34,8 @@ class CameraFrames:
     made : bool
         The four samples were made from phasors, see `unwrap.cameras.canonical`.
     names : tuple of F str
+    saturated_samples : bool [F, K, n, H, W]
+        Which of the samples; of `saturated` any.
     temperature_k, integration_s, laser_power_w, timestamp_s : tuple of F floats or None
         None where neither the recording nor the description tells.
     """
@@ -44,6 +46,7 @@ class CameraFrames:
     frequencies_hz: tuple[float, ...]
     made: bool
     names: tuple[str, ...]
+    saturated_samples: Tensor
     temperature_k: tuple[float, ...] | None = None
     integration_s: tuple[float, ...] | None = None
     laser_power_w: tuple[float, ...] | None = None
@@ -78,7 +81,10 @@ class CameraFrames:
     def at_highest_frequency(self) -> CameraFrames:
         """The samples at the first frequency alone."""
         return replace(
-            self, samples_lsb=self.samples_lsb[:, :1], frequencies_hz=self.frequencies_hz[:1]
+            self,
+            samples_lsb=self.samples_lsb[:, :1],
+            saturated_samples=self.saturated_samples[:, :1],
+            frequencies_hz=self.frequencies_hz[:1],
         )
 
 

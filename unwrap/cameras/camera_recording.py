@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from unwrap.cameras.camera_frames import CameraFrames, as_tensor
-from unwrap.cameras.canonical import canonical
+from unwrap.cameras.canonical import canonical, in_order
 from unwrap.cameras.files import (
     GRAY,
     ArrayFrames,
@@ -89,15 +89,17 @@ class CameraRecording:
         frequencies = self._frequencies(stored)
         by_frequency = samples.reshape(len(names), len(frequencies), -1, *samples.shape[2:])
         ordered, made = canonical(by_frequency, camera.samples)
+        full = in_order(saturated.reshape(by_frequency.shape), camera.samples)
         descending = sorted(range(len(frequencies)), key=lambda k: -frequencies[k])
         gray = self._gray(stored, start, stop)
         return CameraFrames(
             as_tensor(turned(ordered[:, descending], camera.axes)),
-            as_tensor(turned(saturated, camera.axes)),
+            as_tensor(turned(np.any(saturated, axis=1), camera.axes)),
             None if gray is None else as_tensor(turned(gray, camera.axes)),
             tuple(frequencies[k] for k in descending),
             made,
             names,
+            saturated_samples=as_tensor(turned(full[:, descending], camera.axes)),
             **{name: self._told(stored, name, names) for name in BESIDE},
         )
 

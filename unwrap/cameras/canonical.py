@@ -30,13 +30,30 @@ def canonical(planes: np.ndarray, samples: SamplesConfig) -> tuple[np.ndarray, b
     >>> found.ravel().tolist(), made
     ([10.0, 20.0, 30.0, 40.0], False)
     """
+    if (places := _places(samples)) is not None:
+        return planes[..., places, :, :], False
+    cosine, sine = np.moveaxis(_fitted(planes, samples), -3, 0)
+    return np.stack((cosine, sine, -cosine, -sine), axis=-3), True
+
+
+def in_order(saturated: np.ndarray, samples: SamplesConfig) -> np.ndarray:
+    """Which canonical samples [..., 2 or 4, H, W] are saturated, of planes bool [..., P, H, W].
+
+    Of a phasor that is made of several planes a saturated one spoils all four.
+    """
+    if (places := _places(samples)) is not None:
+        return saturated[..., places, :, :]
+    return np.repeat(saturated.any(axis=-3, keepdims=True), len(QUADRATURE), axis=-3)
+
+
+def _places(samples: SamplesConfig) -> list[int] | None:
+    """Planes that are the canonical samples, in their order; None where they have to be made."""
     phases = samples.phases_deg
     if samples.kind == "samples":
         for wanted in (QUADRATURE, QUADRATURE[:2]):
             if sorted(phases) == list(wanted):
-                return planes[..., [phases.index(phase) for phase in wanted], :, :], False
-    cosine, sine = np.moveaxis(_fitted(planes, samples), -3, 0)
-    return np.stack((cosine, sine, -cosine, -sine), axis=-3), True
+                return [phases.index(phase) for phase in wanted]
+    return None
 
 
 def _fitted(planes: np.ndarray, samples: SamplesConfig) -> np.ndarray:

@@ -115,7 +115,7 @@ BAD = {
     ),
     "a word outside": (
         *(SAMPLES, changed(WORD, "<H", 4096)),
-        *(DamagedFrameError, r"frame now, sample 0 holds 4096 .* at row 3, column 5"),
+        *(DamagedFrameError, r"frame now holds 4096 in plane 0 at row 3, column 5"),
     ),
 }
 
