@@ -1,4 +1,7 @@
-"""A camera that is there, in place of a bank: the same choices, from frames as they come."""
+"""A live camera in place of a bank.
+
+The same choices from the same features as in `shotenv.env`, of frames as they come.
+"""
 
 import lazy_loader
 
