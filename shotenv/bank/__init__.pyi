@@ -25,6 +25,7 @@ from .layout import (
     RecordedClip as RecordedClip,
     RecordedContents as RecordedContents,
     StoredNetwork as StoredNetwork,
+    TableOfContents as TableOfContents,
     TruthLevel as TruthLevel,
     frame_bytes as frame_bytes,
 )

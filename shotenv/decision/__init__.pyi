@@ -18,17 +18,24 @@ from .measurement import (
     Measure as Measure,
     Measurement as Measurement,
     measure_frames as measure_frames,
+    told_by as told_by,
 )
 from .measurement_cache import MeasurementCache as MeasurementCache
 from .outcomes import Outcomes as Outcomes, outcomes_of_all_actions as outcomes_of_all_actions
-from .problem import Problem as Problem, open_problem as open_problem, problem_of as problem_of
+from .problem import (
+    Problem as Problem,
+    check_settings as check_settings,
+    load_networks as load_networks,
+    open_problem as open_problem,
+    problem_of as problem_of,
+)
 from .rewards import TERMS as TERMS, weighted as weighted
 from .scenes import (
     Scenes as Scenes,
     look_at_scenes as look_at_scenes,
     probe_features as probe_features,
 )
-from .score import no_depth as no_depth
+from .score import no_depth as no_depth, unscored as unscored
 from .state import State as State, observe as observe
 from .transition import (
     Outcome as Outcome,

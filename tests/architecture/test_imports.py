@@ -122,6 +122,15 @@ room("shotenv.env", *SIGNAL, "unwrap.pictures", *SENSING, "shotenv.decision")
 room(
     "shotenv.dataset", *UNWRAPPING, "unwrap.training", "unwrap.export", *SENSING, "shotenv.decision"
 )
+room(
+    "shotenv.live",
+    *UNWRAPPING,
+    "unwrap.cameras.files",
+    "unwrap.cameras",
+    *SENSING,
+    "shotenv.decision",
+    "shotenv.env",
+)
 room("shotenv", "shotenv.bank", "shotenv.config", "shotenv.sensor", "shotenv.env")
 
 ENVIRONMENT = ("shotenv.config", "shotenv.laser", "shotenv.decision", "shotenv.env")

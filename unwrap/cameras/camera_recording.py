@@ -95,13 +95,13 @@ class CameraRecording:
         descending = sorted(range(len(frequencies)), key=lambda k: -frequencies[k])
         gray = self._gray(stored, start, stop)
         return CameraFrames(
-            as_tensor(_turned(ordered[:, descending], camera.axes)),
-            as_tensor(_turned(np.any(saturated, axis=1), camera.axes)),
-            None if gray is None else as_tensor(_turned(gray, camera.axes)),
+            as_tensor(turned(ordered[:, descending], camera.axes)),
+            as_tensor(turned(np.any(saturated, axis=1), camera.axes)),
+            None if gray is None else as_tensor(turned(gray, camera.axes)),
             tuple(frequencies[k] for k in descending),
             made,
             names,
-            saturated_samples=as_tensor(_turned(full[:, descending], camera.axes)),
+            saturated_samples=as_tensor(turned(full[:, descending], camera.axes)),
             **{name: self._told(stored, name, names) for name in BESIDE},
         )
 
@@ -219,12 +219,12 @@ def _gray_file(path: Path, source: FrameSource) -> FrameSource | np.ndarray:
     return images
 
 
-def _turned(maps: np.ndarray, axes: AxesConfig) -> np.ndarray:
+def turned(maps: np.ndarray, axes: AxesConfig) -> np.ndarray:
     """Maps [..., H, W] as they lie in the view."""
-    turned = maps.swapaxes(-1, -2) if axes.transpose else maps
+    swapped = maps.swapaxes(-1, -2) if axes.transpose else maps
     rows = slice(None, None, -1 if axes.flip_rows else 1)
     columns = slice(None, None, -1 if axes.flip_columns else 1)
-    return turned[..., rows, columns]
+    return swapped[..., rows, columns]
 
 
 def _mhz(frequency_hz: float) -> str:

@@ -20,7 +20,7 @@ from unwrap.cameras.files.camera_description import CameraDescription
 from unwrap.cameras.files.stored_frames import StoredFrames, numbered
 from unwrap.support import in_one_line
 
-HEADER = struct.Struct("!BHHHHHHHHHHhH")
+WIRE_HEADER = struct.Struct("!BHHHHHHHHHHhH")
 CELSIUS_K = 273.15
 
 
@@ -55,10 +55,10 @@ class WireFrames:
                 size, end = None, self.path.stat().st_size
                 while file.tell() < end:
                     frame = sum(not image.is_gray for image in images)
-                    head = file.read(HEADER.size)
-                    if len(head) < HEADER.size:
+                    head = file.read(WIRE_HEADER.size)
+                    if len(head) < WIRE_HEADER.size:
                         raise ValueError(f"frame {frame}: header of {len(head)} bytes; expected 25")
-                    fields = HEADER.unpack(head)
+                    fields = WIRE_HEADER.unpack(head)
                     is_gray = self._is_gray(fields[1], frame)
                     found = self._size(fields, frame)
                     if size is not None and found != size:
