@@ -36,6 +36,13 @@ room("unwrap.ros", "unwrap.support")
 room("unwrap.recordings", *UNWRAPPING, "unwrap.pictures", "unwrap.ros")
 room("unwrap.cameras.files", "unwrap.support", "unwrap.signal", "unwrap.recordings")
 room("unwrap.cameras", *UNWRAPPING, "unwrap.recordings", "unwrap.cameras.files")
+room(
+    "unwrap.cameras.writing",
+    *SIGNAL,
+    "unwrap.recordings",
+    "unwrap.cameras.files",
+    "unwrap.cameras",
+)
 room("unwrap.calibration", *SIGNAL, "unwrap.depth", "unwrap.recordings")
 room("unwrap.export", *UNWRAPPING, "unwrap.training")
 room("unwrap.comparison", *UNWRAPPING, "unwrap.training", "unwrap.pictures")
@@ -135,7 +142,7 @@ ONLY_IN = {
     "onnx": ("unwrap/export/", "agents/deploy/"),
     "onnxruntime": ("unwrap/export/", "agents/deploy/"),
     "openvino": "unwrap/networks/",
-    "h5py": "unwrap/cameras/files/",
+    "h5py": ("unwrap/cameras/files/", "unwrap/cameras/writing/"),
 }
 SOURCES = sorted(
     path.relative_to(ROOT).as_posix()

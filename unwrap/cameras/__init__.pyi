@@ -8,5 +8,6 @@ from .camera_recording import (
     CameraRecording as CameraRecording,
     open_camera_recording as open_camera_recording,
 )
+from .canonical import quadrature_order as quadrature_order
 from .labelling import Labelling as Labelling, fitting as fitting, labellings as labellings
 from .recording_summary import Summary as Summary, summary_of as summary_of

@@ -36,6 +36,8 @@ class CameraFrames:
     names : tuple of F str
     temperature_k, integration_s, laser_power_w, timestamp_s : tuple of F floats or None
         None where neither the recording nor the description tells.
+    saturated_samples : bool [F, K, n, H, W] or None
+        Which samples of a pixel are none; None where it is not known which.
     """
 
     samples_lsb: Tensor
@@ -48,6 +50,7 @@ class CameraFrames:
     integration_s: tuple[float, ...] | None = None
     laser_power_w: tuple[float, ...] | None = None
     timestamp_s: tuple[float, ...] | None = None
+    saturated_samples: Tensor | None = None
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -77,8 +80,12 @@ class CameraFrames:
 
     def at_highest_frequency(self) -> CameraFrames:
         """The samples at the first frequency alone."""
+        flags = self.saturated_samples
         return replace(
-            self, samples_lsb=self.samples_lsb[:, :1], frequencies_hz=self.frequencies_hz[:1]
+            self,
+            samples_lsb=self.samples_lsb[:, :1],
+            frequencies_hz=self.frequencies_hz[:1],
+            saturated_samples=None if flags is None else flags[:, :1],
         )
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from unwrap.cameras.camera_frames import CameraFrames, as_tensor
-from unwrap.cameras.canonical import canonical
+from unwrap.cameras.canonical import canonical, canonical_flags
 from unwrap.cameras.files import (
     GRAY,
     ArrayFrames,
@@ -85,28 +85,37 @@ class CameraRecording:
         """Frames `start` to `stop`; see `pieces` for what is refused."""
         camera, where = self.camera, str(self.source.path)
         stored, names = self._without_gray_plane(start, stop), self.names[start:stop]
-        samples, saturated = samples_of(stored.planes, camera, where, names)
+        samples, flags = samples_of(stored.planes, camera, where, names)
+        if stored.saturated is not None:
+            flags = flags | stored.saturated
         frequencies = self._frequencies(stored)
-        by_frequency = samples.reshape(len(names), len(frequencies), -1, *samples.shape[2:])
-        ordered, made = canonical(by_frequency, camera.samples)
+        by_frequency = len(names), len(frequencies), -1, *samples.shape[2:]
+        ordered, made = canonical(samples.reshape(by_frequency), camera.samples)
+        full = canonical_flags(flags.reshape(by_frequency), camera.samples)
         descending = sorted(range(len(frequencies)), key=lambda k: -frequencies[k])
         gray = self._gray(stored, start, stop)
         return CameraFrames(
             as_tensor(_turned(ordered[:, descending], camera.axes)),
-            as_tensor(_turned(saturated, camera.axes)),
+            as_tensor(_turned(np.logical_or.reduce(flags, axis=1), camera.axes)),
             None if gray is None else as_tensor(_turned(gray, camera.axes)),
             tuple(frequencies[k] for k in descending),
             made,
             names,
             **{name: self._told(stored, name, names) for name in BESIDE},
+            saturated_samples=as_tensor(_turned(full[:, descending], camera.axes)),
         )
 
     def _without_gray_plane(self, start: int, stop: int) -> StoredFrames:
         """Frames as stored, where a plane is the gray image with that apart."""
         stored, passive = self.source.read(start, stop), self.camera.passive
         if passive.where == "plane" and passive.plane is not None:
-            gray = stored.planes[:, passive.plane]
-            return replace(stored, planes=np.delete(stored.planes, passive.plane, 1), gray=gray)
+            gray, flags = stored.planes[:, passive.plane], stored.saturated
+            return replace(
+                stored,
+                planes=np.delete(stored.planes, passive.plane, 1),
+                gray=gray,
+                saturated=None if flags is None else np.delete(flags, passive.plane, 1),
+            )
         if stored.gray is not None and passive.where != "recording":
             raise ValueError(
                 f"{self.source.path}: gray images are in the recording; expected none, as "

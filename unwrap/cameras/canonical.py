@@ -30,13 +30,32 @@ def canonical(planes: np.ndarray, samples: SamplesConfig) -> tuple[np.ndarray, b
     >>> found.ravel().tolist(), made
     ([10.0, 20.0, 30.0, 40.0], False)
     """
+    order = quadrature_order(samples)
+    if order is not None:
+        return planes[..., order, :, :], False
+    cosine, sine = np.moveaxis(_fitted(planes, samples), -3, 0)
+    return np.stack((cosine, sine, -cosine, -sine), axis=-3), True
+
+
+def canonical_flags(flags: np.ndarray, samples: SamplesConfig) -> np.ndarray:
+    """Flags bool [..., 2 or 4, H, W] of canonical samples, of flags [..., P, H, W] of planes.
+
+    Each of four samples that are made is made of all planes, and flagged where any of them is.
+    """
+    order = quadrature_order(samples)
+    if order is not None:
+        return flags[..., order, :, :]
+    return np.repeat(flags.any(axis=-3, keepdims=True), len(QUADRATURE), axis=-3)
+
+
+def quadrature_order(samples: SamplesConfig) -> list[int] | None:
+    """Planes that are the canonical samples, two or four; None where those must be made."""
     phases = samples.phases_deg
     if samples.kind == "samples":
         for wanted in (QUADRATURE, QUADRATURE[:2]):
             if sorted(phases) == list(wanted):
-                return planes[..., [phases.index(phase) for phase in wanted], :, :], False
-    cosine, sine = np.moveaxis(_fitted(planes, samples), -3, 0)
-    return np.stack((cosine, sine, -cosine, -sine), axis=-3), True
+                return [phases.index(phase) for phase in wanted]
+    return None
 
 
 def _fitted(planes: np.ndarray, samples: SamplesConfig) -> np.ndarray:

@@ -12,7 +12,7 @@ from unwrap.cameras.files import CameraDescription, WordsConfig
 def samples_of(
     planes: np.ndarray, camera: CameraDescription, where: str, names: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Samples float32 [F, P, H, W] in LSB, and where a pixel is saturated: bool [F, H, W].
+    """Samples float32 [F, P, H, W] in LSB, and which of them are saturated: bool [F, P, H, W].
 
     Parameters
     ----------
@@ -31,8 +31,7 @@ def samples_of(
         if planes.dtype.kind != "f":
             raise ValueError(f"{where}: numbers are {planes.dtype}; expected floats")
         _refuse(~np.isfinite(planes), planes, "a finite number", where, names)
-        samples = planes.astype(np.float32)
-        return samples, np.zeros((len(planes), *planes.shape[2:]), bool)
+        return planes.astype(np.float32), np.zeros(planes.shape, bool)
     return _integers(planes, words, where, names)
 
 
@@ -62,7 +61,7 @@ def _integers(
     ends = ((values == low) | (values == high)) & words.ends_overflow
     # A code is no sample: in its place stands the middle, and the flag says so.
     samples = np.where(coded, 0, values - words.mid_scale).astype(np.float32)
-    return samples, np.any(coded | ends, axis=1)
+    return samples, coded | ends
 
 
 def gray_of(

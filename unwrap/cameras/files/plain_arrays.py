@@ -14,9 +14,9 @@ from unwrap.recordings import read_arrays, read_png_folder
 from unwrap.support import in_one_line, read_npy_header
 
 PER_FRAME = ("temperature_k", "integration_s", "laser_power_w", "timestamp_s")
-KNOWN = ("dcs", "gray", "frequencies_hz", *PER_FRAME)
-"""What an `.npz` file may hold: `dcs` are the planes, `gray` [F, H, W], one number a frame the
-others."""
+KNOWN = ("dcs", "gray", "saturated", "frequencies_hz", *PER_FRAME)
+"""What an `.npz` file may hold: `dcs` are the planes, `gray` [F, H, W], `saturated` bool [F, H, W]
+or of each plane, as `dcs` lies; one number a frame the others."""
 
 
 @dataclass(frozen=True)
@@ -51,15 +51,11 @@ class ArrayFrames:
         dcs = arrays["dcs"]
         # Folders of images have their own order.
         axes = ("FPHW" if dcs.ndim == 4 else "PHW") if self.path.is_dir() else axes
-        if "F" in axes and dcs.ndim == len(axes) - 1:
-            axes = axes.replace("F", "")  # One frame, saved without its axis.
-        if dcs.ndim != len(axes) or 0 in dcs.shape:
+        if dcs.ndim not in (len(axes), len(axes.replace("F", ""))) or 0 in dcs.shape:
             raise ValueError(
                 f"{self.path}: {dcs.ndim} axes, shape {dcs.shape}; expected {', '.join(axes)}"
             )
-        order = [axes.index(letter) for letter in "FPHW" if letter in axes]
-        planes = dcs.transpose(order)
-        planes = planes if "F" in axes else planes[None]
+        planes = _in_order(dcs, axes)
         if planes.shape[1] != self.camera.stored_planes:
             raise ValueError(
                 f"{self.path}: {planes.shape[1]} planes; expected {self.camera.stored_planes} of "
@@ -90,9 +86,28 @@ class ArrayFrames:
             gray = gray[start:stop]
         told_hz = self._arrays.get("frequencies_hz")
         frequencies = None if told_hz is None else tuple(map(float, np.ravel(told_hz)))
-        return StoredFrames(
-            np.array(self._planes[start:stop]), gray, frequencies_hz=frequencies, **told
-        )
+        planes = np.array(self._planes[start:stop])
+        flags = self._saturated()
+        if flags is not None:
+            flags = np.broadcast_to(flags[start:stop], planes.shape)
+        return StoredFrames(planes, gray, frequencies_hz=frequencies, saturated=flags, **told)
+
+    def _saturated(self) -> np.ndarray | None:
+        """Flags [F, 1, H, W] of pixels or [F, P, H, W] of each plane."""
+        flags, dcs = self._arrays.get("saturated"), self._arrays["dcs"]
+        if flags is None:
+            return None
+        frames, _, height, width = self._planes.shape
+        of_pixels = frames, height, width
+        if flags.dtype != bool or flags.shape not in (of_pixels, dcs.shape):
+            raise ValueError(
+                f"{self.path}: saturated is {flags.dtype} {flags.shape}; expected bool "
+                f"{of_pixels}, or {dcs.shape} as dcs"
+            )
+        assert self.camera.layout.axes is not None
+        if flags.shape == of_pixels:
+            return flags[:, None]
+        return _in_order(flags, self.camera.layout.axes)
 
     def _numbers(self, name: str, start: int, stop: int) -> tuple[float, ...] | None:
         """One number a frame, or one for all."""
@@ -106,6 +121,14 @@ class ArrayFrames:
                 f"{frames}, one for each frame"
             )
         return tuple(map(float, np.broadcast_to(array, frames)[start:stop]))
+
+
+def _in_order(array: np.ndarray, axes: str) -> np.ndarray:
+    """A view [F, P, H, W] of an array whose axes are `axes`; a frame alone may lack its own."""
+    if array.ndim < len(axes):
+        axes = axes.replace("F", "")  # One frame, saved without its axis.
+    found = array.transpose([axes.index(letter) for letter in "FPHW" if letter in axes])
+    return found if "F" in axes else found[None]
 
 
 def _mapped(path: Path) -> np.ndarray:

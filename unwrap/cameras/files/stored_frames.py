@@ -31,6 +31,8 @@ class StoredFrames:
     frequencies_hz : tuple of float or None
         In the order of the planes; None where the file does not tell.
     temperature_k, integration_s, laser_power_w, timestamp_s : tuple of F floats or None
+    saturated : bool [F, P, H, W] or None
+        Full pixels, where they are told beside the words.
     """
 
     planes: np.ndarray
@@ -40,6 +42,7 @@ class StoredFrames:
     integration_s: tuple[float, ...] | None = None
     laser_power_w: tuple[float, ...] | None = None
     timestamp_s: tuple[float, ...] | None = None
+    saturated: np.ndarray | None = None
 
 
 class FrameSource(Protocol):
