@@ -18,7 +18,7 @@ from shotenv.decision import (
     Drive,
     Outcomes,
     Problem,
-    draw_drive,
+    drive_of_seed,
     outcomes_of_all_actions,
     weighted,
 )
@@ -130,15 +130,7 @@ def drive_of(problem: Problem, seed: int) -> Drive:
     """The first drive of an environment after `reset(seed=seed)`."""
     # Gymnasium's own way from a seed to the generator of an environment, then the environment's.
     generator, _ = seeding.np_random(seed)
-    bank, config = problem.bank, problem.config
-    return draw_drive(
-        drive_seed(generator),
-        config,
-        problem.clips,
-        bank.height,
-        bank.width,
-        network=problem.network_work,
-    )
+    return drive_of_seed(problem, drive_seed(generator))
 
 
 def frames_of(drives: Sequence[Drive]) -> np.ndarray:

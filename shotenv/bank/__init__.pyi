@@ -30,3 +30,8 @@ from .thinned import (
     encode_light as encode_light,
     write_thinned as write_thinned,
 )
+from .word_bank import (
+    ClipSettings as ClipSettings,
+    TruthLevel as TruthLevel,
+    WordBank as WordBank,
+)

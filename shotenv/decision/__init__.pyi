@@ -21,7 +21,7 @@ from .measurement import (
 )
 from .measurement_cache import MeasurementCache as MeasurementCache
 from .outcomes import Outcomes as Outcomes, outcomes_of_all_actions as outcomes_of_all_actions
-from .problem import Problem as Problem, open_problem as open_problem
+from .problem import Problem as Problem, open_problem as open_problem, problem_of as problem_of
 from .rewards import TERMS as TERMS, weighted as weighted
 from .scenes import (
     Scenes as Scenes,
@@ -33,6 +33,8 @@ from .state import State as State, observe as observe
 from .transition import (
     Outcome as Outcome,
     allowed_actions as allowed_actions,
+    answered_actions as answered_actions,
+    drive_of_seed as drive_of_seed,
     reset as reset,
     step as step,
 )

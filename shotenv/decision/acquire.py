@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
+from shotenv.bank import WordBank
+from shotenv.config import SensorConfig
 from shotenv.decision.drive import Drive
 from shotenv.decision.problem import Problem
 from shotenv.sensor import (
@@ -87,7 +89,7 @@ def acquire_depths(
     power_w : float64 [B], optional
         What the laser emits while on, W; None is the drive's own power, not derated.
     noise : iterable of float32 [B, 2, H, W], optional
-        Normals of each sample; None draws the drive's own.
+        Normals of each sample; None draws the drive's own. Recorded samples take none.
 
     Returns
     -------
@@ -95,15 +97,11 @@ def acquire_depths(
         In the order of `counts`.
     """
     bank, sensor, frames = problem.bank, problem.config.sensor, drive.frame(step)
-    exposure, gray = bank.exposure(frames), bank.gray(frames)
-    if noise is None:
-        noise = noise_of(drive, step, bank.height, bank.width)
-    # Which pixels count must not depend on the action, and derating follows from earlier ones.
-    undiminished = light = incident_light(exposure, drive.sensitivity)
-    if power_w is not None and drive.is_derated(power_w):
-        light = incident_light(exposure, sensitivity(sensor, power_w, drive.integration_s))
-    scored = scored_pixels(undiminished, exposure.distance_m, sensor)
-    taken = acquire_prefixes(light, sensor, shots=max(counts), noise=noise, offsets=drive.offsets)
+    gray = bank.gray(frames)
+    if isinstance(bank, WordBank):
+        taken, truth_m, scored = recorded(bank, frames, counts, sensor)
+    else:
+        taken, truth_m, scored = simulated(problem, drive, step, max(counts), power_w, noise)
     corrected = []
     for shots in counts:
         # As the sensor itself expects it, from its gray image and, of two samples, its calibration.
@@ -125,10 +123,46 @@ def acquire_depths(
             noise_lsb=noise_lsb,
             shift_m=drive.drift_m,
         )
-        corrected.append(
-            Acquisition(taken[shots], depth, predicted_m, noise_lsb, exposure.distance_m, scored)
-        )
+        corrected.append(Acquisition(taken[shots], depth, predicted_m, noise_lsb, truth_m, scored))
     return corrected
+
+
+Taken = tuple[Mapping[Shots, RawFrame], Tensor, Tensor]
+"""Samples of each number of them, truth float32 [B, H, W], and where it counts, bool [B, H, W]."""
+
+
+def simulated(
+    problem: Problem,
+    drive: Drive,
+    step: Tensor,
+    most: Shots,
+    power_w: Tensor | None,
+    noise: Iterable[Tensor] | None,
+) -> Taken:
+    """Samples of a bank's light, as many as `most` and fewer; see `acquire_depths`."""
+    bank, sensor = problem.bank, problem.config.sensor
+    exposure = bank.exposure(drive.frame(step))
+    if noise is None:
+        noise = noise_of(drive, step, bank.height, bank.width)
+    # Which pixels count must not depend on the action, and derating follows from earlier ones.
+    undiminished = light = incident_light(exposure, drive.sensitivity)
+    if power_w is not None and drive.is_derated(power_w):
+        light = incident_light(exposure, sensitivity(sensor, power_w, drive.integration_s))
+    scored = scored_pixels(undiminished, exposure.distance_m, sensor)
+    taken = acquire_prefixes(light, sensor, shots=most, noise=noise, offsets=drive.offsets)
+    return taken, exposure.distance_m, scored
+
+
+def recorded(
+    bank: WordBank, frames: Tensor, counts: Sequence[Shots], sensor: SensorConfig
+) -> Taken:
+    """Samples as they were recorded: neither noise nor derating acts on them.
+
+    Every pixel with a reference within the range counts.
+    """
+    taken = {shots: bank.words(frames, shots) for shots in sorted(counts, reverse=True)}
+    truth_m = bank.distance_m(frames)
+    return taken, truth_m, truth_m <= sensor.max_range_m
 
 
 def offset_to_subtract_lsb(drive: Drive, shots: Shots) -> Tensor | None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 
 import torch
 from torch import Tensor
 
-from shotenv.bank import Clip
+from shotenv.bank import Clip, ClipSettings
 from shotenv.config import EnvConfig
 from shotenv.laser import NO_NETWORK, NetworkWork, ShotCost, shot_cost
 from shotenv.sensor import (
@@ -113,6 +113,7 @@ def draw_drive(
     *,
     network: NetworkWork = NO_NETWORK,
     options: DriveOptions = DRAWN,
+    recorded: Callable[[Clip], ClipSettings] | None = None,
 ) -> Drive:
     """The drive of `seed`, a batch of one.
 
@@ -121,13 +122,24 @@ def draw_drive(
     would be released.
     `network` is what networks compute in a frame; it counts in `Drive.always_eight`. What
     `options` set replaces what was drawn and shifts nothing else.
+    `recorded` tells the settings of clips that a camera recorded, which are those of the drive.
+
+    Raises
+    ------
+    ValueError
+        An option sets what was recorded.
     """
     # A stream for each purpose: a longer layout does not change the laser that is drawn.
     layout, body = stream(Purpose.DRIVE, seed, 0), stream(Purpose.DRIVE, seed, 1)
     if options.families is not None:
         clips = [clip for clip in clips if clip.family in options.families]
     # One frame more than are played: the last step, too, is followed by an observation.
-    frames = chain_clips(clips, config.frames_per_drive + 1, generator=layout)
+    length, own = config.frames_per_drive + 1, None
+    if recorded is None:
+        frames = chain_clips(clips, length, generator=layout)
+    else:
+        frames, own = chain_recorded(clips, length, recorded, seed=seed, generator=layout)
+        options = with_recorded(options, own)
     # Laser power, integration time, ambient, start temperature and price, whatever their ranges
     # are: a range of no width does not shift the others.
     unit = torch.rand(5, dtype=torch.float64, generator=body)
@@ -146,6 +158,14 @@ def draw_drive(
         generator=stream(Purpose.OFFSETS, seed),
         imager_k=float(imager_k),
     )
+    drift_m = residual_drift_m(config.sensor, imager_k)
+    if own is not None:
+        # What the stored map leaves is in the words.
+        known_lsb = own.offset_lsb.unsqueeze(0)
+        offsets, drift_m = (
+            OffsetPattern(known_lsb, known_lsb),
+            torch.full_like(drift_m, own.shift_m),
+        )
     # The most there is: the reward's terms must not leave 0..1 however warm the laser is.
     always_four, always_eight = (
         shot_cost(
@@ -169,19 +189,22 @@ def draw_drive(
         sensitivity=sensitivity(config.sensor, laser_power_w, integration_s),
         offsets=offsets,
         offset_left_lsb=offset_left_lsb(config.sensor, imager_k),
-        drift_m=residual_drift_m(config.sensor, imager_k),
+        drift_m=drift_m,
         power_price=_chosen(options.power_price, _log_uniform(config.reward.power, unit[4:5])),
         always_four=always_four,
         always_eight=always_eight,
     )
 
 
-def chain_clips(clips: Sequence[Clip], length: int, *, generator: torch.Generator) -> Tensor:
+def chain_clips(
+    clips: Sequence[Clip], length: int, *, generator: torch.Generator, first: Clip | None = None
+) -> Tensor:
     """Bank frames int64 [length] of randomly chosen clips, each played to its end.
 
     The first clip begins at any of its frames, so that drives meet their cuts at different steps;
     those that follow are played from their start. The next clip is of the same family with
     probability `FAMILY_STAYS`, else of any; no clip follows itself where there is a choice.
+    `first` is the first clip where that is not left to chance.
     """
     begin = float(torch.rand((), dtype=torch.float64, generator=generator))
     frames: list[int] = []
@@ -192,12 +215,55 @@ def chain_clips(clips: Sequence[Clip], length: int, *, generator: torch.Generato
         others = [clip for clip in clips if clip is not last] or list(clips)
         same_family = [clip for clip in others if last and clip.family == last.family]
         pool = same_family if same_family and stays < FAMILY_STAYS else others
-        first = last is None
-        last = pool[int(choice * len(pool))]
+        begins = last is None
+        last = first if begins and first else pool[int(choice * len(pool))]
         # The last clip is cut off where the drive ends.
-        skipped = int(begin * last.frames) if first else 0
+        skipped = int(begin * last.frames) if begins else 0
         frames.extend(range(last.start + skipped, last.start + last.frames))
     return torch.tensor(frames[:length])
+
+
+def chain_recorded(
+    clips: Sequence[Clip],
+    length: int,
+    settings: Callable[[Clip], ClipSettings],
+    *,
+    seed: int,
+    generator: torch.Generator,
+) -> tuple[Tensor, ClipSettings]:
+    """Bank frames int64 [length] of clips with the same settings, and these.
+
+    The first clip is the one that has the drive's own seed, if there is one, else drawn: a drive
+    that was simulated and recorded is played again as it was. A clip that is long enough is not
+    left; of others only those that were recorded alike are strung together.
+    """
+    choice, begin = torch.rand(2, dtype=torch.float64, generator=generator).tolist()
+    pool = [clip for clip in clips if clip.seed == seed] or list(clips)
+    first = pool[int(choice * len(pool))]
+    own, spare = settings(first), first.frames - length
+    if spare >= 0:
+        start = first.start + int(begin * (spare + 1))
+        return torch.arange(start, start + length), own
+    alike = [clip for clip in clips if settings(clip).is_like(own)]
+    return chain_clips(alike, length, generator=generator, first=first), own
+
+
+def with_recorded(options: DriveOptions, own: ClipSettings) -> DriveOptions:
+    """Options of a drive with what was recorded.
+
+    Raises
+    ------
+    ValueError
+        An option sets laser power, integration time or ambient temperature.
+    """
+    names = [field.name for field in fields(ClipSettings) if hasattr(options, field.name)]
+    for name in names:
+        if getattr(options, name) is not None:
+            raise ValueError(
+                f"{name} is {getattr(options, name)!r}; expected none, as drives of recordings "
+                f"have the recorded one ({getattr(own, name):g})"
+            )
+    return replace(options, **{name: getattr(own, name) for name in names})
 
 
 def _chosen(value: float | None, drawn: Tensor) -> Tensor:

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from shotenv.bank import WordBank
 from shotenv.config import EnvConfig
 from shotenv.decision.acquire import Acquisition, acquire_depths
 from shotenv.decision.drive import Drive
@@ -70,8 +71,10 @@ def measure_frames(
     """
     each = torch.full_like(step, int(shots)) if isinstance(shots, Shots) else shots
     power_w = drive.laser_power_w if power_w is None else power_w
-    # Networks that look at samples, and votes of neighbours, need whole maps of the batch.
-    if problem.fusion is None and problem.config.eight != "kernel_density":
+    # Networks that look at samples, and votes of neighbours, need whole maps of the batch; of
+    # recorded samples the loop, which begins with light, could take no part.
+    by_maps = problem.fusion is not None or problem.config.eight == "kernel_density"
+    if not by_maps and not isinstance(problem.bank, WordBank):
         return _measured_by_loop(problem, drive, step, each, power_w)
     return _measured_by_maps(problem, drive, step, each, power_w)
 

@@ -15,6 +15,7 @@ from shotenv.bank import (
     PredictedDistances,
     StoredNetwork,
     ThinnedBank,
+    WordBank,
     check_fits,
     find_thinned,
     keep_predictions,
@@ -96,42 +97,89 @@ def open_problem(config: EnvConfig) -> Problem:
         The bank or the network is missing or damaged, the bank was rendered for another sensor or
         frame rate, or a network that needs samples was trained for other frequencies.
     """
-    description = description_of(config.sensor)
-    bank: Bank
-    kept: PredictedDistances
     if (thinned := find_thinned(config.bank)) is not None:
-        bank, fusion = thinned, None
-        check_fits(bank, config.sensor, frame_rate_hz=config.frame_rate_hz)
-        if config.eight == "kernel_density":
-            require_full(bank, f"eight={config.eight!r}")
-        clips = clips_driven(bank, config)
-        # No network is loaded: what it makes of the full frames is in the bank.
-        network = stored_network(thinned, config.unwrapper)
-        kept, scenes = thinned.predictions(network), stored_scenes(thinned, clips, network)
-        work = NetworkWork(gray=network.macs)
-    else:
-        # Networks first: where one is missing, nobody should wait minutes for a rendering.
-        gray, fusion = load_networks(config.unwrapper, description)
-        bank = open_bank(config.bank)
-        check_fits(bank, config.sensor, frame_rate_hz=config.frame_rate_hz)
-        clips = clips_driven(bank, config)
-        images = keep_predictions(bank, gray)
-        kept, scenes = images, look_at_scenes(bank, clips, images, config.sensor)
-        size = bank.height, bank.width
-        work = NetworkWork(
-            gray=gray.macs(*size), samples=0.0 if fusion is None else fusion.macs(*size)
-        )
+        return thinned_problem(thinned, config)
+    # Networks first: where one is missing, nobody should wait minutes for a rendering.
+    networks = load_networks(config.unwrapper, description_of(config.sensor))
+    return problem_of(open_bank(config.bank), config, networks)
+
+
+def thinned_problem(bank: ThinnedBank, config: EnvConfig) -> Problem:
+    """The problem of a thinned bank; see `open_problem`."""
+    check_fits(bank, config.sensor, frame_rate_hz=config.frame_rate_hz)
+    if config.eight == "kernel_density":
+        require_full(bank, f"eight={config.eight!r}")
+    clips = clips_driven(bank, config)
+    # No network is loaded: what it makes of the full frames is in the bank.
+    network = stored_network(bank, config.unwrapper)
     return Problem(
         config=config,
         bank=bank,
         clips=clips,
-        kept=kept,
+        kept=bank.predictions(network),
+        fusion=None,
+        scenes=stored_scenes(bank, clips, network),
+        gray_exposure_s=torch.from_numpy(bank.gray_exposure_s),
+        network_work=NetworkWork(gray=network.macs),
+        description=description_of(config.sensor),
+    )
+
+
+def problem_of(
+    bank: Bank, config: EnvConfig, networks: tuple[Unwrapper, Unwrapper | None] | None = None
+) -> Problem:
+    """The problem of a bank that is open and has whole images; see `open_problem`.
+
+    `networks` are those that `load_networks` gives.
+
+    Raises
+    ------
+    ValueError
+        As `open_problem`, or a clip was recorded with settings that the configuration's laser or
+        sensor cannot have.
+    """
+    description = description_of(config.sensor)
+    gray, fusion = networks or load_networks(config.unwrapper, description)
+    check_fits(bank, config.sensor, frame_rate_hz=config.frame_rate_hz)
+    clips = clips_driven(bank, config)
+    if isinstance(bank, WordBank):
+        check_settings(bank, clips, config)
+    images = keep_predictions(bank, gray)
+    size = bank.height, bank.width
+    work = NetworkWork(gray=gray.macs(*size), samples=0.0 if fusion is None else fusion.macs(*size))
+    return Problem(
+        config=config,
+        bank=bank,
+        clips=clips,
+        kept=images,
         fusion=fusion,
-        scenes=scenes,
+        scenes=look_at_scenes(bank, clips, images, config.sensor),
         gray_exposure_s=torch.from_numpy(bank.gray_exposure_s),
         network_work=work,
         description=description,
     )
+
+
+def check_settings(bank: WordBank, clips: tuple[Clip, ...], config: EnvConfig) -> None:
+    """Refuse clips that were recorded in a way that laser and sensor of `config` cannot have.
+
+    Raises
+    ------
+    BankError
+        Names clip, value and bound.
+    """
+    bounds = {
+        "ambient_k": (config.laser.release_k, "laser.release_k, where a tripped laser comes back"),
+        "integration_s": (config.sensor.sample_period_s, "sensor.sample_period_s"),
+    }
+    for clip in clips:
+        own = bank.settings(clip)
+        for name, (below, what) in bounds.items():
+            if getattr(own, name) >= below:
+                raise BankError(
+                    f"{name} of clip {clip.name} in bank {bank.name} is {getattr(own, name):g}; "
+                    f"expected less than {below:g}, {what}"
+                )
 
 
 def clips_driven(bank: Bank, config: EnvConfig) -> tuple[Clip, ...]:

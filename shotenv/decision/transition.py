@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from shotenv.bank import WordBank
 from shotenv.decision.drive import DRAWN, Drive, DriveOptions, draw_drive
 from shotenv.decision.measurement import Measure, measure_by_shots, measure_frames
 from shotenv.decision.problem import Problem
@@ -74,24 +75,25 @@ def reset(problem: Problem, seeds: Sequence[int], options: DriveOptions = DRAWN)
 
     `options` set something of all of them.
     """
-    config, bank = problem.config, problem.bank
-    drive = concatenate(
-        [
-            draw_drive(
-                seed,
-                config,
-                problem.clips,
-                bank.height,
-                bank.width,
-                network=problem.network_work,
-                options=options,
-            )
-            for seed in seeds
-        ]
-    )
+    drive = concatenate([drive_of_seed(problem, seed, options) for seed in seeds])
     played = torch.zeros(len(seeds), dtype=torch.int64)
     seen = Seen.nothing(drive.frame(played))
     return State(drive, played, start_laser(drive.start_k), seen)
+
+
+def drive_of_seed(problem: Problem, seed: int, options: DriveOptions = DRAWN) -> Drive:
+    """The drive of `seed` through the clips of `problem`, a batch of one; see `draw_drive`."""
+    bank = problem.bank
+    return draw_drive(
+        seed,
+        problem.config,
+        problem.clips,
+        bank.height,
+        bank.width,
+        network=problem.network_work,
+        options=options,
+        recorded=bank.settings if isinstance(bank, WordBank) else None,
+    )
 
 
 @torch.inference_mode()
@@ -107,12 +109,19 @@ def step(
         `granted`, and a laser that is off takes none.
     measure : callable
         `measure_frames`, or a `MeasurementCache`, which gives the same.
+
+    Raises
+    ------
+    ValueError
+        An action asks for samples that were not recorded.
     """
     config, period_s = problem.config, problem.frame_period_s
     drive, laser = state.drive, state.laser
 
     # What is asked for, what the laser can give, and what the frame then brings and costs.
     asked = SHOTS_OF_ACTION.take(actions)
+    if isinstance(problem.bank, WordBank):
+        problem.bank.require_answer(asked)
     shots = granted(problem, drive, laser, asked).masked_fill(laser.tripped, 0)
     power_w = emitted_power_w(drive.laser_power_w, laser.temperature_k, config.laser)
     measured = measure_by_shots(problem, state, shots, power_w, measure)
@@ -160,9 +169,10 @@ def granted(problem: Problem, drive: Drive, laser: LaserState, asked: Tensor) ->
 def allowed_actions(problem: Problem, state: State) -> Tensor:
     """Which actions the laser can take as they are without tripping, bool [B, 3].
 
-    Fewest samples always; and all while the laser is off, for none is taken then.
+    Fewest samples always; and all while the laser is off, for none is taken then. Of samples that
+    were recorded only those that are there.
     """
-    return torch.stack(
+    cool = torch.stack(
         [
             ~would_trip(problem, state.drive, state.laser, torch.full_like(state.step, n))
             | (n == Shots.TWO)
@@ -170,6 +180,13 @@ def allowed_actions(problem: Problem, state: State) -> Tensor:
         ],
         dim=1,
     )
+    return cool & answered_actions(problem)
+
+
+def answered_actions(problem: Problem) -> Tensor:
+    """Which actions the bank can answer, bool [3]: all where it has light."""
+    bank = problem.bank
+    return torch.tensor([not isinstance(bank, WordBank) or n in bank.answers for n in Shots])
 
 
 def would_trip(problem: Problem, drive: Drive, laser: LaserState, shots: Tensor) -> Tensor:
