@@ -104,6 +104,15 @@ room("shotenv.env", *SIGNAL, "unwrap.pictures", *SENSING, "shotenv.decision")
 room(
     "shotenv.dataset", *UNWRAPPING, "unwrap.training", "unwrap.export", *SENSING, "shotenv.decision"
 )
+room(
+    "shotenv.recording",
+    *SIGNAL,
+    "unwrap.cameras",
+    "unwrap.cameras.files",
+    "unwrap.cameras.writing",
+    *SENSING,
+    "shotenv.decision",
+)
 room("shotenv", "shotenv.bank", "shotenv.config", "shotenv.sensor", "shotenv.env")
 
 ENVIRONMENT = ("shotenv.config", "shotenv.laser", "shotenv.decision", "shotenv.env")
