@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -122,8 +123,8 @@ def planes_of(samples: np.ndarray, camera: CameraDescription) -> np.ndarray:
     cosine, sine = ((samples[:, :, k] - samples[:, :, k + 2]) / 2 for k in (0, 1))
     # What is common to all samples is the pixel's offset; the parts of a phasor have none.
     common = samples.mean(axis=2) if camera.samples.kind == "samples" else np.float32(0)
-    angles = np.deg2rad(camera.samples.phases_deg).astype(np.float32)
-    return np.stack([common + cosine * np.cos(a) + sine * np.sin(a) for a in angles], axis=2)
+    angles = map(math.radians, camera.samples.phases_deg)
+    return np.stack([common + cosine * math.cos(a) + sine * math.sin(a) for a in angles], axis=2)
 
 
 def flags_of(flags: np.ndarray, camera: CameraDescription) -> np.ndarray:
