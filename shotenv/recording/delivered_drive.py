@@ -52,7 +52,7 @@ class DeliveredDrive:
 
 
 @torch.inference_mode()
-def delivered_drive(
+def deliver_drive(
     problem: Problem, seed: int, *, tick: Callable[[int], object] = lambda frames: None
 ) -> DeliveredDrive:
     """The drive `seed` of a problem, at the full power of its laser.

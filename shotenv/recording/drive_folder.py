@@ -20,7 +20,7 @@ import yaml
 
 from shotenv.config import SensorConfig
 from shotenv.decision import Problem
-from shotenv.recording.delivered_drive import DeliveredDrive, delivered_drive
+from shotenv.recording.delivered_drive import DeliveredDrive, deliver_drive
 from unwrap.cameras.files import CameraDescription
 from unwrap.cameras.writing import container_of, kept_frequencies, write_camera_recording
 from unwrap.support import building_folder, write_text
@@ -81,7 +81,7 @@ def write_drives(
     require_camera(camera, problem.config.sensor)
     with building_folder(folder) as building:
         rows = [
-            _write_drive(building, delivered_drive(problem, seed, tick=tick), camera)
+            _write_drive(building, deliver_drive(problem, seed, tick=tick), camera)
             for seed in seeds
         ]
         about = {
