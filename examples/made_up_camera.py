@@ -66,7 +66,7 @@ def main(
     hidden = imager.sensor.model_dump(mode="json") | {"distance_offset_m": imager.delay_m}
     write_yaml(folder / "hidden.yaml", hidden)
     wall = still_wall(imager)
-    write_camera_recording(folder, "wall", delivered(camera, imager, [wall] * 8, 900)[0], camera)
+    write_camera_recording(folder, "wall", delivered(camera, imager, [wall], 900, 8)[0], camera)
     bench_rows = write_bench(folder / "bench", camera, imager)
     write_drives(folder / "drives", camera, imager, drives, frames)
     print(f"{folder}: a wall, {bench_rows} recordings of a bench and {drives} drives of {name}")
@@ -114,29 +114,35 @@ def hidden_imager(camera: CameraDescription, seed: int, size: tuple[int, int]) -
     of_the_kind = ("f1_hz", "f2_hz", "saturation_range_m", "max_range_m", "adc_bits")
     changes: dict[str, Any] = {name: getattr(kind, name) for name in of_the_kind}
     changes["gain_lsb_per_e"] = found.sensor.gain_lsb_per_e * 2.0 ** (kind.adc_bits - 12)
-    return replace(found, sensor=merged(found.sensor, changes))
+    # Millimetres to centimetres off: more would look like another order at 120 MHz.
+    return replace(found, sensor=merged(found.sensor, changes), delay_m=0.1 * found.delay_m)
 
 
 def delivered(
-    camera: CameraDescription, imager: Camera, scenes: Sequence[Scene], number: int
+    camera: CameraDescription, imager: Camera, scenes: Sequence[Scene], number: int, each: int = 1
 ) -> tuple[CameraFrames, list[float]]:
-    """A frame of each scene at all of the camera's frequencies, and exposures of gray images."""
+    """So many frames of each scene at all of the camera's frequencies, and gray exposures.
+
+    `number` tells recordings apart.
+    """
     first_hz, *others = sorted(camera.frequencies_hz, reverse=True)
     samples, saturated, gray, exposures_s = [], [], [], []
     for frame, scene in enumerate(scenes):
         taken = []
         # Two frequencies at a time; a third is taken with the first once more.
         for second_hz in others or [imager.sensor.f2_hz]:
-            pair = replace(imager, sensor=merged(imager.sensor, {"f2_hz": second_hz}))
-            raw, words, exposure_s = record(pair, scene, 1, 1000 * number + frame)
+            # The range is no part of recording, and must not exceed that of the pair.
+            changes = {"f2_hz": second_hz, "max_range_m": 1.0}
+            pair = replace(imager, sensor=merged(imager.sensor, changes))
+            raw, words, exposure_s = record(pair, scene, each, 1000 * number + frame)
             taken.append(raw)
         of_first = taken[0].dcs_lsb[:, None, :4]
         rest = [raw.dcs_lsb[:, None, 4:] for raw in taken] if others else []
         samples.append(torch.cat((of_first, *rest), 1))
         saturated.append(torch.stack([raw.saturated for raw in taken]).any(0))
         gray.append(words / (2.0**imager.sensor.adc_bits - 1))
-        exposures_s.append(exposure_s)
-    count = len(scenes)
+        exposures_s += [exposure_s] * each
+    count = len(exposures_s)
     frames = CameraFrames(
         samples_lsb=torch.cat(samples),
         saturated=torch.cat(saturated),
@@ -144,7 +150,7 @@ def delivered(
         frequencies_hz=(first_hz, *others),
         made=False,
         names=tuple(f"{frame:05d}" for frame in range(count)),
-        temperature_k=tuple(scene.temperature_k for scene in scenes),
+        temperature_k=tuple(scene.temperature_k for scene in scenes for _ in range(each)),
         integration_s=(INTEGRATION_S,) * count,
         laser_power_w=(LASER_W,) * count,
         timestamp_s=tuple(frame / FRAME_RATE_HZ for frame in range(count)),
@@ -164,7 +170,7 @@ def write_bench(folder: Path, camera: CameraDescription, imager: Camera) -> int:
     folder.mkdir()
     rows = []
     for number, (known, scene, count) in enumerate(bench(imager)):
-        frames, exposures_s = delivered(camera, imager, [scene] * count, number)
+        frames, exposures_s = delivered(camera, imager, [scene], number, count)
         name = f"{number:02d}_{known['kind']}"
         written = write_camera_recording(folder, name, frames, camera)
         rows.append({**files_of(written), **known, "gray_exposure_s": exposures_s[0]})
