@@ -113,6 +113,8 @@ def hidden_imager(camera: CameraDescription, seed: int, size: tuple[int, int]) -
     found, kind = hidden_camera(seed, height=size[0], width=size[1]), nominal_sensor(camera)
     of_the_kind = ("f1_hz", "f2_hz", "saturation_range_m", "max_range_m", "adc_bits")
     changes: dict[str, Any] = {name: getattr(kind, name) for name in of_the_kind}
+    # Edges soften as they come faster.
+    changes["harmonic_strength"] = found.sensor.harmonic_strength * min(1.0, 24e6 / kind.f1_hz)
     changes["gain_lsb_per_e"] = found.sensor.gain_lsb_per_e * 2.0 ** (kind.adc_bits - 12)
     # Millimetres to centimetres off: more would look like another order at 120 MHz.
     return replace(found, sensor=merged(found.sensor, changes), delay_m=0.1 * found.delay_m)
@@ -126,7 +128,7 @@ def delivered(
     `number` tells recordings apart.
     """
     first_hz, *others = sorted(camera.frequencies_hz, reverse=True)
-    samples, saturated, gray, exposures_s = [], [], [], []
+    samples, flags, gray, exposures_s = [], [], [], []
     for frame, scene in enumerate(scenes):
         taken = []
         # Two frequencies at a time; a third is taken with the first once more.
@@ -139,13 +141,16 @@ def delivered(
         of_first = taken[0].dcs_lsb[:, None, :4]
         rest = [raw.dcs_lsb[:, None, 4:] for raw in taken] if others else []
         samples.append(torch.cat((of_first, *rest), 1))
-        saturated.append(torch.stack([raw.saturated for raw in taken]).any(0))
+        # Which sample was full is not told: each of the pixel's counts as such.
+        full = torch.stack([raw.saturated for raw in taken]).any(0)
+        flags.append(full[:, None, None].expand_as(samples[-1]))
         gray.append(words / (2.0**imager.sensor.adc_bits - 1))
         exposures_s += [exposure_s] * each
     count = len(exposures_s)
     frames = CameraFrames(
         samples_lsb=torch.cat(samples),
-        saturated=torch.cat(saturated),
+        saturated=torch.cat(flags)[:, 0, 0],
+        saturated_samples=torch.cat(flags),
         gray=torch.cat(gray).float(),
         frequencies_hz=(first_hz, *others),
         made=False,

@@ -62,11 +62,11 @@ def info_arguments(parser: ArgumentParser) -> None:
 
 def tell_about_banks(arguments: Namespace) -> int:
     """Tell what is in a bank, or which banks there are."""
-    from shotenv.bank import (
+    from shotenv.bank import open_bank
+    from shotenv.bank.listing import (
         contact_sheet,
         contents_of,
         known_banks,
-        open_bank,
         print_banks,
         print_contents,
     )
@@ -130,7 +130,8 @@ def thin_arguments(parser: ArgumentParser) -> None:
 
 def write_thinned_bank(arguments: Namespace) -> int:
     """Make a thinned bank of a rendered one."""
-    from shotenv.bank import contents_of, open_bank, print_contents
+    from shotenv.bank import open_bank
+    from shotenv.bank.listing import contents_of, print_contents
     from shotenv.dataset import thin_bank
 
     bank = open_bank(arguments.bank)

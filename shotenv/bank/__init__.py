@@ -14,9 +14,10 @@ one that comes with the package.
     bank.py             a bank that is open: its clips, splits and frames; one with every pixel
     thinned.py          one that has a pixel of each few, and what was made of its full frames
     compatibility.py    whether a sensor and a frame rate are those it was made for
-    contents.py         what is in a bank, and which there are, in words and numbers
-    contact_sheets.py   what it looks like
+    word_bank.py        one that has what a camera delivered, in place of light
+    recorded_bank.py    such a one on disk
     predictions.py      what networks make of its gray images, kept
+    listing/            what is in a bank, and which there are: words, numbers, pictures
 """
 
 import lazy_loader

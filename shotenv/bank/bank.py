@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
@@ -14,10 +14,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from shotenv.bank.layout import ARRAYS, BankError, Manifest, TableOfContents
+from shotenv.bank.layout import ARRAYS, BankError, Manifest, TableOfContents, TruthLevel
 from shotenv.bank.store import read_manifest
 from shotenv.config import TRAINING_FAMILIES, Split
 from shotenv.sensor import Exposure
+from unwrap.signal import Shots
 from unwrap.training import RANDOM_SPLITS, random_split
 
 OPEN_CLIPS = 128
@@ -72,12 +73,16 @@ class MappedClips:
     ----------
     folders
         Of the clips, in their order.
+    names
+        Of the arrays.
     most
         Clips mapped at a time.
     """
 
-    def __init__(self, folders: Sequence[Path], most: int = OPEN_CLIPS) -> None:
-        self._folders, self._most = tuple(folders), most
+    def __init__(
+        self, folders: Sequence[Path], names: Collection[str] = ARRAYS, *, most: int = OPEN_CLIPS
+    ) -> None:
+        self._folders, self._names, self._most = tuple(folders), tuple(names), most
         self._mapped: OrderedDict[int, dict[str, Tensor]] = OrderedDict()
         self._lock = Lock()
 
@@ -91,11 +96,10 @@ class MappedClips:
             self._mapped.move_to_end(clip)  # The one unused for longest comes first.
             return self._mapped[clip]
 
-    @staticmethod
-    def _map(folder: Path) -> dict[str, Tensor]:
+    def _map(self, folder: Path) -> dict[str, Tensor]:
         # Copy-on-write: torch wants a writable array, and the file is never written to.
         arrays = {
-            n: np.load(folder / f"{n}.npy", mmap_mode="c", allow_pickle=False) for n in ARRAYS
+            n: np.load(folder / f"{n}.npy", mmap_mode="c", allow_pickle=False) for n in self._names
         }
         return {name: torch.from_numpy(array) for name, array in arrays.items()}
 
@@ -162,6 +166,16 @@ class Bank(ABC):
     def width(self) -> int:
         """Pixels across."""
         return self.manifest.width
+
+    @property
+    def answers(self) -> tuple[Shots, ...]:
+        """Acquisitions that frames can be taken with, ascending; of light all."""
+        return tuple(Shots)
+
+    @property
+    def truth_level(self) -> TruthLevel:
+        """What distances are scored against; rendered light knows."""
+        return "external"
 
     @property
     def fingerprint(self) -> str:
@@ -252,6 +266,16 @@ class Bank(ABC):
     def _per_frame(self, field: str) -> np.ndarray:
         return np.concatenate([np.asarray(getattr(clip, field)) for clip in self.manifest.clips])
 
+    def _gathered(self, arrays: MappedClips, name: str, indices: Sequence[int]) -> Tensor:
+        """Array `name` of the frames `indices`, stacked; a single one is a view of the file."""
+        # Frame by frame: each lies in one piece in its clip's file, and only its pages are read.
+        clips = [int(self._clip_of_frame[index]) for index in indices]
+        frames = [
+            arrays[clip][name].narrow(0, index - self.clips[clip].start, 1)
+            for clip, index in zip(clips, indices, strict=True)
+        ]
+        return frames[0] if len(frames) == 1 else torch.cat(frames)
+
     def _checked(self, index: int) -> int:
         if not 0 <= index < len(self):
             raise IndexError(f"frame index is {index}; expected 0..{len(self) - 1}")
@@ -270,25 +294,16 @@ class RenderedBank(Bank):
     def exposure(self, indices: Tensor) -> Exposure:
         """See `Bank.exposure`."""
         rows = indices.tolist()
-        return Exposure(**{name: self._gather(name, rows) for name in ARRAYS if name != "gray"})
+        light = (name for name in ARRAYS if name != "gray")
+        return Exposure(**{name: self._gathered(self._arrays, name, rows) for name in light})
 
     def distance_m(self, indices: Tensor) -> Tensor:
         """See `Bank.distance_m`."""
-        return self._gather("distance_m", indices.tolist())
+        return self._gathered(self._arrays, "distance_m", indices.tolist())
 
     def gray(self, indices: Tensor) -> Tensor:
         """See `Bank.gray`."""
-        return self._gather("gray", indices.tolist())
-
-    def _gather(self, name: str, indices: Sequence[int]) -> Tensor:
-        """Array `name` of the frames `indices`, stacked; a single one is a view of the file."""
-        # Frame by frame: each lies in one piece in its clip's file, and only its pages are read.
-        clips = [int(self._clip_of_frame[index]) for index in indices]
-        frames = [
-            self._arrays[clip][name].narrow(0, index - self.clips[clip].start, 1)
-            for clip, index in zip(clips, indices, strict=True)
-        ]
-        return frames[0] if len(frames) == 1 else torch.cat(frames)
+        return self._gathered(self._arrays, "gray", indices.tolist())
 
 
 def require_full(bank: Bank, what: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from shotenv.bank.bank import Bank
+from shotenv.bank.recorded_bank import RecordedBank
 from shotenv.config import ACQUISITION_FIELDS, SensorConfig
 
 BAKED_FIELDS = tuple(
@@ -39,6 +40,8 @@ def check_fits(bank: Bank, sensor: SensorConfig, *, frame_rate_hz: float | None 
     ValueError
         Names the field, both values and the cure.
     """
+    if isinstance(bank, RecordedBank):
+        check_recorded(bank, sensor, frame_rate_hz)
     if bank.config is None:
         return
     for field in BAKED_FIELDS:
@@ -61,3 +64,25 @@ def check_fits(bank: Bank, sensor: SensorConfig, *, frame_rate_hz: float | None 
             f"frame_rate_hz is {frame_rate_hz:g}, but bank {bank.name} was rendered at "
             f"{rendered_hz:g}; ask for that, or render a bank at this frame rate"
         )
+
+
+def check_recorded(bank: RecordedBank, sensor: SensorConfig, frame_rate_hz: float | None) -> None:
+    """Refuse frequencies, bits or a frame rate with which a bank's recordings were not made.
+
+    Raises
+    ------
+    ValueError
+        Names the field and both values.
+    """
+    about, own = bank.manifest, bank.manifest.sensor
+    # Without samples at f2 it may be any.
+    fields = ("f1_hz", *(("f2_hz",) if about.samples == 8 else ()), "adc_bits")
+    values = [(f"sensor.{name}", getattr(sensor, name), getattr(own, name)) for name in fields]
+    if frame_rate_hz is not None:
+        values.append(("frame_rate_hz", frame_rate_hz, about.frame_rate_hz))
+    for name, wanted, recorded in values:
+        if wanted != recorded:
+            raise ValueError(
+                f"{name} is {wanted:g}, but bank {bank.name} was recorded with {recorded:g}; "
+                f"{bank.folder / 'env.yaml'} is a configuration that fits"
+            )

@@ -10,6 +10,11 @@ A thinned bank, one pixel of each few:
 
 <bank>/thinned.json             written last: schema, positions, networks, configuration, clips
 <bank>/arrays.npz               all arrays, frames first (see `THINNED_ARRAYS`)
+
+A bank of recordings:
+
+<bank>/recorded.json            written last: schema, camera, sensor, truth, one record per clip
+<bank>/clips/<clip>/*.npy       one array per quantity (see `RecordedContents.arrays`)
 """
 
 from __future__ import annotations
@@ -23,11 +28,16 @@ from typing import Final, Literal, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from shotenv.config import BankConfig, Split
+from shotenv.config import BankConfig, SensorConfig, Split
 
 SCHEMA_VERSION: Final = 1
 MANIFEST, CLIPS, CLIP_RECORD = "manifest.json", "clips", "clip.json"
 THINNED_CONTENTS, THINNED_FILE = "thinned.json", "arrays.npz"
+RECORDED_CONTENTS = "recorded.json"
+
+TruthLevel = Literal["external", "own", "none"]
+"""What distances are scored against: a reference; the depth of a camera's own eight samples where
+its two frequencies agree; or nothing."""
 
 
 class BankError(ValueError):
@@ -184,6 +194,72 @@ class ThinnedContents(TableOfContents):
     def fingerprint(self) -> str:
         """See `TableOfContents.fingerprint`."""
         return self.sha256[:16]
+
+
+class RecordedClip(ClipFacts):
+    """A recording with a folder of its own: what it was made with, and the digest of each file."""
+
+    folder: str = Field(pattern=r"^clips/[A-Za-z0-9_-]{1,80}$")
+    source: str = Field(description="file that it was imported from")
+    laser_power_w: float = Field(gt=0, description="optical power while on, W")
+    integration_s: float = Field(gt=0, description="time of one sample, s")
+    ambient_k: float = Field(gt=0, description="ambient temperature, K")
+    shift_m: float = Field(description="added to every distance, m")
+    sha256: dict[str, str]
+
+
+class RecordedContents(TableOfContents):
+    """Table of contents of a bank of recordings."""
+
+    camera: str = Field(description="name of the camera's description")
+    sensor: SensorConfig = Field(description="what the camera counts as")
+    samples: Literal[4, 8] = Field(description="of a frame: at f1, and at f2")
+    words: Literal["int16", "float32"] = Field(description="type of the samples, LSB")
+    made: bool = Field(description="whether samples were made of phasors")
+    truth: TruthLevel
+    frame_rate_hz: float = Field(gt=0)
+    clips: tuple[RecordedClip, ...] = Field(min_length=1)
+
+    @property
+    def fingerprint(self) -> str:
+        """See `TableOfContents.fingerprint`."""
+        digest = hashlib.sha256()
+        for clip in self.clips:
+            digest.update(json.dumps([clip.name, sorted(clip.sha256.items())]).encode())
+        return digest.hexdigest()[:16]
+
+    def arrays(self, frames: int) -> dict[str, tuple[str, tuple[int, ...]]]:
+        """Type and shape of each array of a clip of so many frames.
+
+        Bit k of "saturated" is set where sample k is no sample. "distance_m" is there with external
+        truth; NaN where there is no reference.
+        """
+        size = (self.height, self.width)
+        found = {
+            "words": (self.words, (frames, self.samples, *size)),
+            "saturated": ("uint8", (frames, *size)),
+            "gray": ("uint16", (frames, *size)),
+            "offset_lsb": ("float32", size),
+        }
+        if self.truth == "external":
+            found["distance_m"] = ("float32", (frames, *size))
+        return found
+
+    @model_validator(mode="after")
+    def _eight_samples_for_their_own_truth(self) -> Self:
+        if self.truth == "own" and self.samples != 8:
+            raise ValueError(f"truth is 'own' of {self.samples} samples; expected 8")
+        return self
+
+    @model_validator(mode="after")
+    def _a_digest_for_each_array(self) -> Self:
+        for clip in self.clips:
+            if set(clip.sha256) != set(self.arrays(clip.frames)):
+                raise ValueError(
+                    f"sha256 of clip {clip.name} names {sorted(clip.sha256)}; expected "
+                    f"{sorted(self.arrays(clip.frames))}"
+                )
+        return self
 
 
 def frame_bytes(height: int, width: int) -> int:

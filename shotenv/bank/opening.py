@@ -7,7 +7,8 @@ from pathlib import Path
 from shotenv.bank.bank import Bank, RenderedBank
 from shotenv.bank.build import build_bank, clips_standing
 from shotenv.bank.folders import SHIPPED, bank_folder
-from shotenv.bank.layout import MANIFEST, THINNED_CONTENTS, BankError
+from shotenv.bank.layout import MANIFEST, RECORDED_CONTENTS, THINNED_CONTENTS, BankError
+from shotenv.bank.recorded_bank import RecordedBank
 from shotenv.bank.thinned import ThinnedBank
 from shotenv.config import BankConfig, ConfigError, find_config, read_config
 
@@ -23,8 +24,8 @@ def find_thinned(bank: str | Path) -> ThinnedBank | None:
     # A name is one part: SHIPPED / "/somewhere" would be somewhere.
     folders = [Path(bank), *([SHIPPED / bank] if Path(bank).name == str(bank) else [])]
     for folder in folders:
-        # A rendered bank in a folder of the name of a shipped one is what is meant.
-        if (folder / MANIFEST).is_file():
+        # Another bank in a folder of the name of a shipped one is what is meant.
+        if any((folder / name).is_file() for name in (MANIFEST, RECORDED_CONTENTS)):
             return None
         if (folder / THINNED_CONTENTS).is_file():
             return ThinnedBank(folder)
@@ -50,6 +51,8 @@ def open_bank(bank: str | Path, *, render: bool = True) -> Bank:
     # A folder first: who names a path means what lies there, not a configuration of that name.
     if (Path(bank) / MANIFEST).is_file():
         return RenderedBank(Path(bank))
+    if (Path(bank) / RECORDED_CONTENTS).is_file():
+        return RecordedBank(Path(bank))
     if (thinned := find_thinned(bank)) is not None:
         return thinned
     try:

@@ -12,7 +12,7 @@ import os
 import shutil
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from pydantic import ValidationError
@@ -22,17 +22,21 @@ from shotenv.bank.layout import (
     CLIP_RECORD,
     CLIPS,
     MANIFEST,
+    RECORDED_CONTENTS,
     THINNED_CONTENTS,
     THINNED_FILE,
-    ArraySpec,
     BankError,
     ClipRecord,
     Manifest,
+    RecordedClip,
+    RecordedContents,
+    TableOfContents,
     ThinnedContents,
 )
 from shotenv.config import BankConfig, one_sentence
 from unwrap.support import read_npy_header, write_json
 
+Contents = TypeVar("Contents", bound=TableOfContents)
 LARGEST_JSON_BYTES = 64 * 2**20
 """A manifest has some 2 kB for each clip."""
 
@@ -170,14 +174,24 @@ def read_manifest(folder: Path) -> Manifest:
     manifest = _validated(Manifest, _load_json(path), path)
     for clip in manifest.clips:
         for name, spec in ARRAYS.items():
-            _check_header(folder / clip.folder / f"{name}.npy", clip, spec, manifest)
+            shape = (clip.frames, *spec.channels, manifest.height, manifest.width)
+            _check_header(folder / clip.folder / f"{name}.npy", spec.dtype, shape)
     return manifest
 
 
 def write_thinned_contents(folder: Path, contents: ThinnedContents) -> None:
     """Write the table of contents of a thinned bank, with a digest of itself."""
+    _write_contents(folder / THINNED_CONTENTS, contents)
+
+
+def write_recorded_contents(folder: Path, contents: RecordedContents) -> None:
+    """Write the table of contents of a bank of recordings, with a digest of itself."""
+    _write_contents(folder / RECORDED_CONTENTS, contents)
+
+
+def _write_contents(path: Path, contents: TableOfContents) -> None:
     content = contents.model_dump(mode="json")
-    write_json(folder / THINNED_CONTENTS, {**content, "digest": _digest_of(content)})
+    write_json(path, {**content, "digest": _digest_of(content)})
 
 
 def read_thinned_contents(folder: Path) -> ThinnedContents:
@@ -188,11 +202,29 @@ def read_thinned_contents(folder: Path) -> ThinnedContents:
     BankError
         It is not JSON, oversized, of another schema, or not as it was written.
     """
-    path = folder / THINNED_CONTENTS
+    return _read_contents(ThinnedContents, folder / THINNED_CONTENTS)
+
+
+def read_recorded_contents(folder: Path) -> RecordedContents:
+    """Table of contents of the bank of recordings in `folder`.
+
+    Raises
+    ------
+    BankError
+        As of a thinned bank, or an array file is not of the type and length that it tells.
+    """
+    contents = _read_contents(RecordedContents, folder / RECORDED_CONTENTS)
+    for clip in contents.clips:
+        for name, (dtype, shape) in contents.arrays(clip.frames).items():
+            _check_header(folder / clip.folder / f"{name}.npy", dtype, shape)
+    return contents
+
+
+def _read_contents(model: type[Contents], path: Path) -> Contents:
     content = _load_json(path)
     if content.pop("digest", None) != _digest_of(content):
         raise BankError(f"{path} is damaged (not as it was written); {cure_for(path)}")
-    return _validated(ThinnedContents, content, path)
+    return _validated(model, content, path)
 
 
 def _digest_of(content: Mapping[str, Any]) -> str:
@@ -222,14 +254,15 @@ def cure_for(path: Path) -> str:
     """What mends a bank in which the file `path` is damaged."""
     if path.name in (THINNED_CONTENTS, THINNED_FILE):
         return "thin the bank again, or install shotenv again where the bank is its own"
+    if any((parent / RECORDED_CONTENTS).is_file() for parent in path.parents[:3]):
+        return "import the recordings again"
     return f"delete {path if path.name == MANIFEST else path.parent} and render the bank again"
 
 
-def _check_header(path: Path, clip: ClipRecord, spec: ArraySpec, manifest: Manifest) -> None:
-    """Refuse an array file whose header or length is not what the manifest says."""
+def _check_header(path: Path, dtype: str, shape: tuple[int, ...]) -> None:
+    """Refuse an array file whose header or length is not what the table of contents says."""
     # The length counts, too: a mapped file that is too short ends the process (SIGBUS) when read.
-    shape = (clip.frames, *spec.channels, manifest.height, manifest.width)
-    expected = int(np.prod(shape)) * np.dtype(spec.dtype).itemsize
+    expected = int(np.prod(shape)) * np.dtype(dtype).itemsize
     try:
         with path.open("rb") as file:
             header = read_npy_header(file)
@@ -237,9 +270,9 @@ def _check_header(path: Path, clip: ClipRecord, spec: ArraySpec, manifest: Manif
     except (OSError, ValueError):
         raise BankError(f"{path} is missing or damaged; {cure_for(path)}") from None
     promised = (header.shape, header.fortran_order, header.dtype, length)
-    if promised != (shape, False, np.dtype(spec.dtype), expected):
+    if promised != (shape, False, np.dtype(dtype), expected):
         raise BankError(
-            f"{path} holds {header.dtype} {header.shape}, {length} bytes; expected {spec.dtype} "
+            f"{path} holds {header.dtype} {header.shape}, {length} bytes; expected {dtype} "
             f"{shape}, {expected} bytes; {cure_for(path)}"
         )
 
@@ -259,13 +292,17 @@ def verify(folder: Path, *, tick: Callable[[], object] = lambda: None) -> tuple[
     BankError
         The manifest or an array's header is damaged.
     """
+    damaged: list[str] = []
     if (folder / THINNED_CONTENTS).is_file():
         whole = sha256_of(folder / THINNED_FILE) == read_thinned_contents(folder).sha256
         return () if whole else (THINNED_FILE,)
-    damaged: list[str] = []
+    if (folder / RECORDED_CONTENTS).is_file():
+        for recorded in read_recorded_contents(folder).clips:
+            damaged += _damaged_arrays(folder, recorded)
+            tick()
+        return tuple(damaged)
     for clip in read_manifest(folder).clips:
-        arrays = {f"{clip.folder}/{name}.npy": digest for name, digest in clip.sha256.items()}
-        damaged += [path for path, digest in arrays.items() if sha256_of(folder / path) != digest]
+        damaged += _damaged_arrays(folder, clip)
         try:
             same = read_clip_record(folder / clip.folder) == clip
         except BankError:
@@ -274,3 +311,9 @@ def verify(folder: Path, *, tick: Callable[[], object] = lambda: None) -> tuple[
             damaged.append(f"{clip.folder}/{CLIP_RECORD}")
         tick()
     return tuple(damaged)
+
+
+def _damaged_arrays(folder: Path, clip: ClipRecord | RecordedClip) -> list[str]:
+    """Array files of a clip that have another digest than its record tells."""
+    arrays = {f"{clip.folder}/{name}.npy": digest for name, digest in clip.sha256.items()}
+    return [path for path, digest in arrays.items() if sha256_of(folder / path) != digest]

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Literal
 
 import torch
 from torch import Tensor
 
 from shotenv.bank.bank import Bank, Clip
-from shotenv.bank.layout import BankError
+from shotenv.bank.layout import BankError, TruthLevel
 from shotenv.sensor import Exposure
 from unwrap.signal import RawFrame, Shots
-
-TruthLevel = Literal["external", "own", "none"]
-"""What distances are scored against: a reference map; the depth of the camera's own eight samples,
-where its two frequencies agree; or nothing."""
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
 from shotenv.bank import WordBank
-from shotenv.config import SensorConfig
 from shotenv.decision.drive import Drive
 from shotenv.decision.problem import Problem
 from shotenv.sensor import (
@@ -21,7 +22,7 @@ from shotenv.sensor import (
     sensitivity,
 )
 from unwrap.depth import correct
-from unwrap.signal import GRAY_FULL_SCALE, DepthFrame, RawFrame, Sensed, Shots
+from unwrap.signal import GRAY_FULL_SCALE, DepthFrame, RawFrame, Sensed, Shots, unambiguous_range_m
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ class Acquisition:
         The network's distance, the sensor's own estimate of a sample's noise, the truth.
     scored : bool [B, H, W]
         Where the pixel counts.
+    truth_error_m : float32 [B, H, W] or None
+        Expected error of a truth that was measured with the same samples; None of any other.
     """
 
     raw: RawFrame
@@ -44,6 +47,7 @@ class Acquisition:
     noise_lsb: Tensor
     truth_m: Tensor
     scored: Tensor
+    truth_error_m: Tensor | None = None
 
 
 def noise_of(drive: Drive, step: Tensor, height: int, width: int) -> Iterator[Tensor]:
@@ -96,22 +100,14 @@ def acquire_depths(
     list of Acquisition
         In the order of `counts`.
     """
-    bank, sensor, frames = problem.bank, problem.config.sensor, drive.frame(step)
-    gray = bank.gray(frames)
+    bank, frames = problem.bank, drive.frame(step)
     if isinstance(bank, WordBank):
-        taken, truth_m, scored = recorded(bank, frames, counts, sensor)
+        taken, truth = recorded(problem, bank, drive, frames, counts)
     else:
-        taken, truth_m, scored = simulated(problem, drive, step, max(counts), power_w, noise)
+        taken, truth = simulated(problem, drive, step, max(counts), power_w, noise)
     corrected = []
     for shots in counts:
-        # As the sensor itself expects it, from its gray image and, of two samples, its calibration.
-        noise_lsb = sample_noise_lsb(
-            gray,
-            problem.gray_exposure_s.take(frames),
-            drive.integration_s,
-            sensor,
-            offset_left_lsb=drive.offset_left_lsb if shots == Shots.TWO else None,
-        )
+        noise_lsb = told_noise_lsb(problem, drive, frames, shots)
         predicted_m = predict(problem, drive, frames, taken[shots], noise_lsb)
         depth = correct(
             taken[shots],
@@ -123,12 +119,33 @@ def acquire_depths(
             noise_lsb=noise_lsb,
             shift_m=drive.drift_m,
         )
-        corrected.append(Acquisition(taken[shots], depth, predicted_m, noise_lsb, truth_m, scored))
+        corrected.append(Acquisition(taken[shots], depth, predicted_m, noise_lsb, *truth))
     return corrected
 
 
-Taken = tuple[Mapping[Shots, RawFrame], Tensor, Tensor]
-"""Samples of each number of them, truth float32 [B, H, W], and where it counts, bool [B, H, W]."""
+def told_noise_lsb(problem: Problem, drive: Drive, frames: Tensor, shots: Shots) -> Tensor:
+    """Noise of a sample among `shots` as the sensor itself expects it, float32 [B, H, W], LSB.
+
+    By its gray image and, of two samples, its calibration.
+    """
+    return sample_noise_lsb(
+        problem.bank.gray(frames),
+        problem.gray_exposure_s.take(frames),
+        drive.integration_s,
+        problem.config.sensor,
+        offset_left_lsb=drive.offset_left_lsb if shots == Shots.TWO else None,
+    )
+
+
+class Truth(NamedTuple):
+    """What distances are scored against; fields of an `Acquisition`."""
+
+    truth_m: Tensor
+    scored: Tensor
+    truth_error_m: Tensor | None = None
+
+
+Taken = Mapping[Shots, RawFrame]
 
 
 def simulated(
@@ -138,7 +155,7 @@ def simulated(
     most: Shots,
     power_w: Tensor | None,
     noise: Iterable[Tensor] | None,
-) -> Taken:
+) -> tuple[Taken, Truth]:
     """Samples of a bank's light, as many as `most` and fewer; see `acquire_depths`."""
     bank, sensor = problem.bank, problem.config.sensor
     exposure = bank.exposure(drive.frame(step))
@@ -150,19 +167,45 @@ def simulated(
         light = incident_light(exposure, sensitivity(sensor, power_w, drive.integration_s))
     scored = scored_pixels(undiminished, exposure.distance_m, sensor)
     taken = acquire_prefixes(light, sensor, shots=most, noise=noise, offsets=drive.offsets)
-    return taken, exposure.distance_m, scored
+    return taken, Truth(exposure.distance_m, scored)
 
 
 def recorded(
-    bank: WordBank, frames: Tensor, counts: Sequence[Shots], sensor: SensorConfig
-) -> Taken:
+    problem: Problem, bank: WordBank, drive: Drive, frames: Tensor, counts: Sequence[Shots]
+) -> tuple[Taken, Truth]:
     """Samples as they were recorded: neither noise nor derating acts on them.
 
     Every pixel with a reference within the range counts.
     """
-    taken = {shots: bank.words(frames, shots) for shots in sorted(counts, reverse=True)}
-    truth_m = bank.distance_m(frames)
-    return taken, truth_m, truth_m <= sensor.max_range_m
+    level = bank.truth_level
+    asked = {*counts, Shots.EIGHT} if level == "own" else set(counts)
+    taken = {shots: bank.words(frames, shots) for shots in sorted(asked, reverse=True)}
+    error_m = None
+    if level == "external":
+        truth_m = bank.distance_m(frames)
+    elif level == "own":
+        truth_m, error_m = own_reference(problem, drive, frames, taken[Shots.EIGHT])
+    else:
+        truth_m = torch.full((len(frames), bank.height, bank.width), torch.nan)
+    return taken, Truth(truth_m, truth_m <= problem.config.sensor.max_range_m, error_m)
+
+
+def own_reference(
+    problem: Problem, drive: Drive, frames: Tensor, eight: RawFrame
+) -> tuple[Tensor, Tensor]:
+    """Depth of eight samples without any network, and its expected error, both [B, H, W], metres.
+
+    NaN where a frequency is weak, a pixel saturated, or the two disagree. Noise n of a sample turns
+    the phase of four, of amplitude A, by n / (sqrt(2) A); both frequencies together measure f1 and
+    f2 with weights f^2, and a normal error is sqrt(2 / pi) of its standard deviation in the mean.
+    """
+    noise_lsb = told_noise_lsb(problem, drive, frames, Shots.EIGHT)
+    sensor = problem.description
+    depth = correct(eight, None, sensor, noise_lsb=noise_lsb, shift_m=drive.drift_m)
+    m_per_rad = unambiguous_range_m(sensor.f1_hz) / (2 * math.pi)
+    fused = sensor.f1_hz / math.hypot(sensor.f1_hz, sensor.f2_hz)
+    spread_m = m_per_rad * fused * noise_lsb / (math.sqrt(2) * depth.amplitude)
+    return depth.distance_m, math.sqrt(2 / math.pi) * spread_m
 
 
 def offset_to_subtract_lsb(drive: Drive, shots: Shots) -> Tensor | None:

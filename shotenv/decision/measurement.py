@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -17,7 +17,16 @@ from shotenv.decision.drive import Drive
 from shotenv.decision.features import SEEN_FEATURES, TOLD, Sums, evaluated
 from shotenv.decision.frame_loop import Chain, FramesTaken, room_for, score_frames_
 from shotenv.decision.problem import Problem
-from shotenv.decision.score import SCORES, SUMMED, DepthScore, no_depth, score_depth, sum_pixels_
+from shotenv.decision.score import (
+    SCORES,
+    SUMMED,
+    DepthScore,
+    error_beside,
+    no_depth,
+    score_depth,
+    sum_pixels_,
+    unscored,
+)
 from shotenv.decision.state import State
 from shotenv.sensor import gray_noise, incident_light, pixel_of, row_parity, sensitivity
 from unwrap.depth import RULES, dual_limits, merge_limits, shift_in_turns, turns_table
@@ -172,10 +181,12 @@ def _measured_by_maps(
     problem: Problem, drive: Drive, step: Tensor, shots: Tensor, power_w: Tensor
 ) -> Measurement:
     """Map by map; drives that take the same number of samples are one batch."""
-    lost = no_depth(len(shots), problem.config.sensor.max_range_m)
+    lost = lost_depth(problem, len(shots))
     unseen = torch.zeros(len(shots), len(SEEN_FEATURES))
     found = Measurement(lost, torch.zeros_like(lost.error), unseen)
-    for count in sorted(set(shots.tolist())):
+    # Where nothing is scored there is no reference, and a frame without laser is not taken at all.
+    idle = {0} if problem.bank.truth_level == "none" else set()
+    for count in sorted(set(shots.tolist()) - idle):
         rows = (shots == count).nonzero().squeeze(1)
         part_drive, part_step = take(drive, rows), step[rows]
         # Nothing is measured without laser; the reference is that of one that works.
@@ -191,11 +202,15 @@ def _measured_alike(
     problem: Problem, drive: Drive, step: Tensor, shots: Shots, power_w: Tensor
 ) -> Measurement:
     # Of two samples the reference needs two more, which are taken for it alone.
-    counts = [n for n in Shots if n <= max(shots, Shots.FOUR)]
+    scored = problem.bank.truth_level != "none"
+    counts = [n for n in Shots if n <= (max(shots, Shots.FOUR) if scored else shots)]
     acquired = acquire_depths(problem, drive, step, counts, power_w)
     taken = acquired[: counts.index(shots) + 1]
+    if not scored:
+        nothing = lost_depth(problem, len(step))
+        return Measurement(nothing, nothing.error, told_by(problem, taken))
     reference = acquired[counts.index(Shots.FOUR)]
-    if drive.is_derated(power_w):
+    if drive.is_derated(power_w) and not isinstance(problem.bank, WordBank):
         (reference,) = acquire_depths(problem, drive, step, (Shots.FOUR,))
     return Measurement(
         score_of(problem, taken[-1]),
@@ -204,17 +219,40 @@ def _measured_alike(
     )
 
 
+def lost_depth(problem: Problem, batch: int) -> DepthScore:
+    """Score of frames without laser: full error, or none where no depth is scored."""
+    if problem.bank.truth_level == "none":
+        return unscored(batch)
+    return no_depth(batch, problem.config.sensor.max_range_m)
+
+
 def score_of(problem: Problem, acquisition: Acquisition) -> DepthScore:
-    """Score over the pixels that the drive's own laser lights enough, whatever is emitted now."""
-    return score_depth(
-        acquisition.depth.distance_m,
-        acquisition.depth.valid,
+    """Score over the pixels that the drive's own laser lights enough, whatever is emitted now.
+
+    Against a truth that eight samples have measured themselves, its expected error adds to that of
+    all acquisitions, and those eight samples have no other.
+    """
+    depth, scale_m = acquisition.depth, problem.config.reward.error_scale_m
+    score = score_depth(
+        depth.distance_m,
+        depth.valid,
         acquisition.truth_m,
         acquisition.scored,
-        error_scale_m=problem.config.reward.error_scale_m,
-        unambiguous_m=acquisition.depth.unambiguous_m,
+        error_scale_m=scale_m,
+        unambiguous_m=depth.unambiguous_m,
         range_m=problem.config.sensor.max_range_m,
     )
+    if acquisition.truth_error_m is None:
+        return score
+    is_truth = acquisition.raw.shots == Shots.EIGHT
+    apart_m = (depth.distance_m - acquisition.truth_m).abs()
+    error = error_beside(
+        torch.zeros_like(apart_m) if is_truth else apart_m,
+        acquisition.truth_error_m,
+        acquisition.scored,
+        scale_m,
+    )
+    return replace(unscored(len(error)) if is_truth else score, error=error)
 
 
 def told_by(problem: Problem, taken: Sequence[Acquisition]) -> Tensor:

@@ -10,10 +10,10 @@ from torch import Tensor
 from shotenv.config import ROOM_K
 from shotenv.decision.drive import Drive
 from shotenv.decision.features import TOLD
-from shotenv.decision.measurement import Measurement, measure_frames
+from shotenv.decision.measurement import Measurement, lost_depth, measure_frames
 from shotenv.decision.problem import Problem
 from shotenv.decision.rewards import reference_terms, reward, reward_terms
-from shotenv.decision.score import DepthScore, no_depth
+from shotenv.decision.score import DepthScore
 from shotenv.decision.transition import SHOTS_OF_ACTION, cost_of
 from unwrap.support import concatenate, mapped, take
 
@@ -71,7 +71,7 @@ def outcomes_of_all_actions(problem: Problem, drive: Drive) -> Outcomes:
 
     # A tripped laser takes no samples and costs what the chips need.
     off = cost_of(problem, drive, torch.zeros(1, dtype=torch.int64), room_k)
-    lost = no_depth(1, problem.config.sensor.max_range_m)
+    lost = lost_depth(problem, 1)
     tripped_terms = reward_terms(lost, off, drive.always_eight, torch.ones(1, dtype=torch.bool))
     # One number in each frame, the same whatever the action.
     reference = reference_terms(measured.error_of_four[:, 0], drive)

@@ -142,6 +142,26 @@ def no_depth(batch: int, range_m: float) -> DepthScore:
     return DepthScore(one, one * range_m, one * range_m, zero, zero, zero)
 
 
+def unscored(batch: int) -> DepthScore:
+    """Score of frames that nothing is known of: no error that counts, and no measure."""
+    zero = torch.zeros(batch, dtype=torch.float64)
+    return DepthScore(zero, *(torch.full_like(zero, torch.nan) for _ in SCORES[1:]))
+
+
+def error_beside(
+    apart_m: Tensor, truth_error_m: Tensor, scored: Tensor, error_scale_m: float
+) -> Tensor:
+    """Error term float64 [B] of depth that lies `apart_m` from a truth that errs itself, [B, H, W].
+
+    The largest mean error that both allow, their sum, over the pixels `scored`; 0 where there is
+    none.
+    """
+    error_m = apart_m + truth_error_m
+    term = torch.where(scored, error_m / (error_m + error_scale_m), 0.0)
+    total = term.sum(dim=-1).sum(dim=-1, dtype=torch.float64)
+    return total / scored.sum(dim=(-2, -1)).clamp(min=1)
+
+
 @loop
 def sum_pixels_(
     amplitude_lsb: Array,

@@ -185,8 +185,7 @@ def allowed_actions(problem: Problem, state: State) -> Tensor:
 
 def answered_actions(problem: Problem) -> Tensor:
     """Which actions the bank can answer, bool [3]: all where it has light."""
-    bank = problem.bank
-    return torch.tensor([not isinstance(bank, WordBank) or n in bank.answers for n in Shots])
+    return torch.tensor([shots in problem.bank.answers for shots in Shots])
 
 
 def would_trip(problem: Problem, drive: Drive, laser: LaserState, shots: Tensor) -> Tensor:

@@ -99,6 +99,24 @@ room(
     "shotenv.scenes",
     "shotenv.sensor",
 )
+room(
+    "shotenv.bank.listing",
+    "unwrap.signal",
+    "unwrap.pictures",
+    "shotenv.config",
+    "shotenv.sensor",
+    "shotenv.bank",
+)
+room(
+    "shotenv.recorded",
+    *SIGNAL,
+    "unwrap.recordings",
+    "unwrap.cameras.files",
+    "unwrap.cameras",
+    "shotenv.config",
+    "shotenv.sensor",
+    "shotenv.bank",
+)
 room("shotenv.decision", *UNWRAPPING, *SENSING)
 room("shotenv.env", *SIGNAL, "unwrap.pictures", *SENSING, "shotenv.decision")
 room(

@@ -13,7 +13,7 @@ from shotenv.bank.bank import Clip
 from shotenv.bank.layout import ClipFacts, TableOfContents
 from shotenv.bank.word_bank import ClipSettings, TruthLevel, WordBank
 from shotenv.decision.acquire import acquire_depths
-from shotenv.decision.problem import Problem
+from shotenv.decision.problem import Problem, problem_of
 from shotenv.decision.transition import drive_of_seed
 from unwrap.signal.frames import RawFrame
 from unwrap.signal.shots import Shots
@@ -138,3 +138,9 @@ def record(problem: Problem, seed: int, *, name: str = "recorded") -> Recorded:
         ),
         facts=facts,
     )
+
+
+def replayed_problem(simulated: Problem, recorded: Sequence[Recorded], **kind) -> Problem:
+    """The problem of `simulated` with these recordings in place of its bank; `kind` of the bank."""
+    key = "".join(f"{one.facts.name}{one.facts.frames}" for one in recorded)
+    return problem_of(HeldWords(recorded, key=key, **kind), simulated.config)

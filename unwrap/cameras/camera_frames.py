@@ -34,10 +34,10 @@ class CameraFrames:
     made : bool
         The four samples were made from phasors, see `unwrap.cameras.canonical`.
     names : tuple of F str
+    saturated_samples : bool [F, K, n, H, W]
+        Which of the samples; of `saturated` any.
     temperature_k, integration_s, laser_power_w, timestamp_s : tuple of F floats or None
         None where neither the recording nor the description tells.
-    saturated_samples : bool [F, K, n, H, W] or None
-        Which samples of a pixel are none; None where it is not known which.
     """
 
     samples_lsb: Tensor
@@ -46,11 +46,11 @@ class CameraFrames:
     frequencies_hz: tuple[float, ...]
     made: bool
     names: tuple[str, ...]
+    saturated_samples: Tensor
     temperature_k: tuple[float, ...] | None = None
     integration_s: tuple[float, ...] | None = None
     laser_power_w: tuple[float, ...] | None = None
     timestamp_s: tuple[float, ...] | None = None
-    saturated_samples: Tensor | None = None
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -80,12 +80,11 @@ class CameraFrames:
 
     def at_highest_frequency(self) -> CameraFrames:
         """The samples at the first frequency alone."""
-        flags = self.saturated_samples
         return replace(
             self,
             samples_lsb=self.samples_lsb[:, :1],
+            saturated_samples=self.saturated_samples[:, :1],
             frequencies_hz=self.frequencies_hz[:1],
-            saturated_samples=None if flags is None else flags[:, :1],
         )
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from unwrap.cameras.camera_frames import CameraFrames, as_tensor
-from unwrap.cameras.canonical import canonical, canonical_flags
+from unwrap.cameras.canonical import canonical, in_order
 from unwrap.cameras.files import (
     GRAY,
     ArrayFrames,
@@ -85,24 +85,24 @@ class CameraRecording:
         """Frames `start` to `stop`; see `pieces` for what is refused."""
         camera, where = self.camera, str(self.source.path)
         stored, names = self._without_gray_plane(start, stop), self.names[start:stop]
-        samples, flags = samples_of(stored.planes, camera, where, names)
+        samples, saturated = samples_of(stored.planes, camera, where, names)
         if stored.saturated is not None:
-            flags = flags | stored.saturated
+            saturated = saturated | stored.saturated
         frequencies = self._frequencies(stored)
-        by_frequency = len(names), len(frequencies), -1, *samples.shape[2:]
-        ordered, made = canonical(samples.reshape(by_frequency), camera.samples)
-        full = canonical_flags(flags.reshape(by_frequency), camera.samples)
+        by_frequency = samples.reshape(len(names), len(frequencies), -1, *samples.shape[2:])
+        ordered, made = canonical(by_frequency, camera.samples)
+        full = in_order(saturated.reshape(by_frequency.shape), camera.samples)
         descending = sorted(range(len(frequencies)), key=lambda k: -frequencies[k])
         gray = self._gray(stored, start, stop)
         return CameraFrames(
             as_tensor(_turned(ordered[:, descending], camera.axes)),
-            as_tensor(_turned(np.logical_or.reduce(flags, axis=1), camera.axes)),
+            as_tensor(_turned(np.any(saturated, axis=1), camera.axes)),
             None if gray is None else as_tensor(_turned(gray, camera.axes)),
             tuple(frequencies[k] for k in descending),
             made,
             names,
-            **{name: self._told(stored, name, names) for name in BESIDE},
             saturated_samples=as_tensor(_turned(full[:, descending], camera.axes)),
+            **{name: self._told(stored, name, names) for name in BESIDE},
         )
 
     def _without_gray_plane(self, start: int, stop: int) -> StoredFrames:

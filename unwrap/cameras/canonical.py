@@ -30,26 +30,24 @@ def canonical(planes: np.ndarray, samples: SamplesConfig) -> tuple[np.ndarray, b
     >>> found.ravel().tolist(), made
     ([10.0, 20.0, 30.0, 40.0], False)
     """
-    order = quadrature_order(samples)
-    if order is not None:
-        return planes[..., order, :, :], False
+    if (places := quadrature_order(samples)) is not None:
+        return planes[..., places, :, :], False
     cosine, sine = np.moveaxis(_fitted(planes, samples), -3, 0)
     return np.stack((cosine, sine, -cosine, -sine), axis=-3), True
 
 
-def canonical_flags(flags: np.ndarray, samples: SamplesConfig) -> np.ndarray:
-    """Flags bool [..., 2 or 4, H, W] of canonical samples, of flags [..., P, H, W] of planes.
+def in_order(saturated: np.ndarray, samples: SamplesConfig) -> np.ndarray:
+    """Which canonical samples [..., 2 or 4, H, W] are saturated, of planes bool [..., P, H, W].
 
-    Each of four samples that are made is made of all planes, and flagged where any of them is.
+    Of a phasor that is made of several planes a saturated one spoils all four.
     """
-    order = quadrature_order(samples)
-    if order is not None:
-        return flags[..., order, :, :]
-    return np.repeat(flags.any(axis=-3, keepdims=True), len(QUADRATURE), axis=-3)
+    if (places := quadrature_order(samples)) is not None:
+        return saturated[..., places, :, :]
+    return np.repeat(saturated.any(axis=-3, keepdims=True), len(QUADRATURE), axis=-3)
 
 
 def quadrature_order(samples: SamplesConfig) -> list[int] | None:
-    """Planes that are the canonical samples, two or four; None where those must be made."""
+    """Planes that are the canonical samples, in their order; None where they have to be made."""
     phases = samples.phases_deg
     if samples.kind == "samples":
         for wanted in (QUADRATURE, QUADRATURE[:2]):

@@ -12,7 +12,7 @@ from unwrap.cameras.files import CameraDescription, WordsConfig
 def samples_of(
     planes: np.ndarray, camera: CameraDescription, where: str, names: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Samples float32 [F, P, H, W] in LSB, and which of them are saturated: bool [F, P, H, W].
+    """Samples float32 [F, P, H, W] in LSB, and which are saturated: bool [F, P, H, W].
 
     Parameters
     ----------
@@ -31,7 +31,8 @@ def samples_of(
         if planes.dtype.kind != "f":
             raise ValueError(f"{where}: numbers are {planes.dtype}; expected floats")
         _refuse(~np.isfinite(planes), planes, "a finite number", where, names)
-        return planes.astype(np.float32), np.zeros(planes.shape, bool)
+        samples = planes.astype(np.float32)
+        return samples, np.zeros(planes.shape, bool)
     return _integers(planes, words, where, names)
 
 

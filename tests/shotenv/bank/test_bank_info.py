@@ -11,16 +11,16 @@ from PIL import Image
 
 from agents.cli.entry import main
 from shotenv.bank.clip_jobs import clip_jobs
-from shotenv.bank.contact_sheets import (
+from shotenv.bank.folders import bank_folder
+from shotenv.bank.layout import BankError
+from shotenv.bank.listing.contact_sheets import (
     clips_by_family,
     clips_shown,
     color_maps,
     contact_sheet,
     maps_of,
 )
-from shotenv.bank.contents import known_banks
-from shotenv.bank.folders import bank_folder
-from shotenv.bank.layout import BankError
+from shotenv.bank.listing.contents import known_banks
 from shotenv.bank.opening import open_bank
 from shotenv.config.bank import BankConfig
 from shotenv.config.families import FAMILIES

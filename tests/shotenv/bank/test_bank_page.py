@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from shotenv.bank.contents import known_banks
+from shotenv.bank.listing.contents import known_banks
 from shotenv.config.bank import BankConfig
 from shotenv.config.families import FAMILIES, SHIFT_FAMILIES, TRAINING_FAMILIES
 from shotenv.config.reader import find_config, read_config

@@ -6,43 +6,18 @@ import dataclasses
 
 import pytest
 import torch
+from word_banks import HeldWords, replayed_problem
 
 from shotenv.bank.layout import BankError
-from shotenv.config.keywords import env_config
 from shotenv.decision.acquire import acquire_depths
 from shotenv.decision.drive import DriveOptions
 from shotenv.decision.measurement_cache import MeasurementCache
-from shotenv.decision.problem import open_problem, problem_of
+from shotenv.decision.problem import problem_of
 from shotenv.decision.state import observe
 from shotenv.decision.transition import allowed_actions, drive_of_seed, reset, step
-from tests.helpers.word_banks import HeldWords, record
 from unwrap.signal.shots import Shots
 
 SEEDS = (5, 6, 2**61 + 7)
-
-
-@pytest.fixture(scope="module")
-def simulated(tiny_kwargs, session_cache):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("SHOTENV_CACHE", session_cache)
-        return open_problem(env_config(**tiny_kwargs, split="test"))
-
-
-@pytest.fixture(scope="module")
-def drives(simulated):
-    return [record(simulated, seed, name=f"drive_{seed}") for seed in SEEDS]
-
-
-def replayed_problem(simulated, recorded, **kind):
-    key = "".join(f"{one.facts.name}{one.facts.frames}" for one in recorded)
-    return problem_of(HeldWords(recorded, key=key, **kind), simulated.config)
-
-
-@pytest.fixture(scope="module")
-def replayed(simulated, drives, session_cache):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("SHOTENV_CACHE", session_cache)
-        return replayed_problem(simulated, drives)
 
 
 def fields_equal(one, other):

@@ -18,9 +18,9 @@ from scene_files import write_obj
 from agents.cli import main
 from shotenv.bank.clip_jobs import clip_jobs
 from shotenv.bank.clip_rendering import world_of
-from shotenv.bank.contact_sheets import contact_sheet
 from shotenv.bank.folders import bank_folder, identity
 from shotenv.bank.layout import BankError
+from shotenv.bank.listing.contact_sheets import contact_sheet
 from shotenv.bank.opening import open_bank
 from shotenv.bank.store import verify
 from shotenv.config.bank import BankConfig, WorldConfig

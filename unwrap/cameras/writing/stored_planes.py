@@ -50,12 +50,9 @@ def stored_frames(
     kept = kept_frequencies(frames.frequencies_hz, camera, tells_frequencies=tells_frequencies)
     order = [frames.frequencies_hz.index(hz) for hz in kept]
     samples = _as_stored(frames.samples_lsb.numpy()[:, order], camera.axes)
-    flags = frames.saturated_samples
-    full = np.zeros(samples.shape, bool) if flags is None else flags.numpy()[:, order]
-    if flags is None:
-        full |= frames.saturated.numpy()[:, None, None]
+    flags = _as_stored(frames.saturated_samples.numpy()[:, order], camera.axes)
     planes = _joined(planes_of(samples, camera))
-    full = _joined(flags_of(_as_stored(full, camera.axes), camera))
+    full = _joined(flags_of(flags, camera))
     words = words_of(planes, full & (not tells_saturation), camera)
     gray = None
     if frames.gray is not None:

@@ -10,8 +10,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from shotenv.bank.bank import Bank, Clip, require_full
-from shotenv.bank.layout import BankError
+from shotenv.bank import Bank, BankError, Clip, require_full
 from shotenv.config import SensorConfig
 from shotenv.sensor import full_scale_lsb
 from unwrap.pictures import (

@@ -5,12 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from shotenv.bank.bank import Bank
-from shotenv.bank.build import bank_bytes, clips_standing, rendering_minutes
-from shotenv.bank.folders import SHIPPED, bank_folder
-from shotenv.bank.layout import MANIFEST, THINNED_CONTENTS, frame_bytes
-from shotenv.bank.store import read_thinned_contents
-from shotenv.bank.thinned import ThinnedBank
+from shotenv.bank import (
+    MANIFEST,
+    SHIPPED,
+    THINNED_CONTENTS,
+    Bank,
+    ThinnedBank,
+    bank_bytes,
+    bank_folder,
+    clips_standing,
+    frame_bytes,
+    read_thinned_contents,
+    rendering_minutes,
+)
 from shotenv.config import BankConfig, configs_dir, read_config
 
 
