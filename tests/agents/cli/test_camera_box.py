@@ -24,7 +24,7 @@ CAMERAS = (
 )
 """All but the Kinect's logs, whose images are of one size, and the one for simulation."""
 TELL_NO_NOISE = ("kinect_v2_dump", "phasor_video")
-DRIVES, FRAMES, SIZE = 2, 9, (12, 16)
+DRIVES, FRAMES, SIZE = 2, 9, (24, 32)
 
 
 @pytest.fixture(scope="session")
