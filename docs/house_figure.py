@@ -63,7 +63,10 @@ BACK, FRONT = (530, 644), (412, 522)
 MAIN, CELLAR = (174, 298), (67, 166)
 PLACES = {
     "agents.cli": Box(374, 626, 900, 954),
+    "agents.cli.command": Box(424, 519, 926, 949),
+    "agents.cli.cameras": Box(525, 620, 926, 949),
     "agents.report": Box(30, 120, *TOP),
+    "agents.report.calibration": Box(36, 114, 739, 759),
     "agents.evaluation": Box(126, 260, *TOP),
     "agents.optimum": Box(266, 394, *TOP),
     "agents.training": Box(400, 530, *TOP),

@@ -1,4 +1,4 @@
-"""Commands that write drives for others to read: for Minari, for Rerun, and as a camera does."""
+"""Commands that write drives for others to read: a data set of Minari, a recording for Rerun."""
 
 from __future__ import annotations
 
@@ -8,24 +8,17 @@ import numpy as np
 from jsonargparse import ArgumentParser, Namespace
 from jsonargparse.typing import NonNegativeInt, PositiveInt
 
-from agents.cli.camera_commands import read_camera
 from agents.cli.command import (
     DONE,
     Command,
-    add_config,
-    add_json,
-    add_trust,
-    section_of,
-    write_numbers,
-)
-from agents.cli.experiment import (
     add_experiment,
+    add_trust,
     experiment_of,
     play_on_one_thread,
     prepare_bank,
+    write_numbers,
 )
 from agents.cli.play_command import policy_of
-from shotenv.config import EnvConfig
 from unwrap.support import progress
 
 
@@ -112,42 +105,7 @@ def rerun(arguments: Namespace) -> int:
     return DONE
 
 
-def record_arguments(parser: ArgumentParser) -> None:
-    """Which drives, which camera, and where its recordings go."""
-    parser.add_argument("--camera", required=True, help="name or path of a camera's description")
-    parser.add_argument("--drives", type=PositiveInt, default=4, help="drives to record")
-    parser.add_argument("--seed", type=NonNegativeInt, default=0, help="seed of the first")
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="FOLDER", help="of the recordings"
-    )
-    add_config(parser, EnvConfig, "env/default.yaml")
-    add_json(parser)
-
-
-def record(arguments: Namespace) -> int:
-    """Write simulated drives as a camera would have recorded them."""
-    from shotenv.decision import open_problem
-    from shotenv.recording import require_camera, write_drives
-
-    config, (camera, _) = section_of(EnvConfig, arguments), read_camera(arguments.camera)
-    kept = require_camera(camera, config.sensor)  # before minutes are spent
-    prepare_bank(config)
-    play_on_one_thread()
-    problem = open_problem(config)
-    seeds = range(arguments.seed, arguments.seed + arguments.drives)
-    frames = len(seeds) * (config.frames_per_drive + 1)
-    with progress(frames, "recording", "frame") as bar:
-        write_drives(arguments.out, problem, seeds, camera, tick=bar.update)
-    megahertz = " and ".join(f"{hz / 1e6:g}" for hz in kept)
-    print(f"{frames} frames at {megahertz} MHz, as {camera.name} stores them: {arguments.out}")
-    write_numbers(arguments, {"frames": frames, "drives": len(seeds), "frequencies_hz": kept})
-    return DONE
-
-
 COMMANDS = (
     Command("collect", "write drives as a Minari data set", collect_arguments, collect),
-    Command(
-        "record", "write drives as a camera would have recorded them", record_arguments, record
-    ),
     Command("rerun", "write a drive for the Rerun viewer", rerun_arguments, rerun),
 )

@@ -15,8 +15,6 @@ from jsonargparse import ArgumentError, Namespace
 
 from agents.cli import (
     bank_commands,
-    camera_calibrate_command,
-    camera_commands,
     collect_command,
     doctor,
     export_command,
@@ -25,6 +23,7 @@ from agents.cli import (
     schedule_commands,
     unwrap_commands,
 )
+from agents.cli.cameras import CALIBRATE, CORRECT, DESCRIBE, RECORD
 from agents.cli.command import DONE, FAILED, INTERRUPTED, WRONG_USAGE, Command
 from shotenv.config import ConfigError, one_sentence
 
@@ -38,8 +37,10 @@ COMMANDS: tuple[Command, ...] = (
     *export_command.COMMANDS,
     *bank_commands.COMMANDS,
     *unwrap_commands.COMMANDS,
-    *camera_commands.COMMANDS,
-    *camera_calibrate_command.COMMANDS,
+    CORRECT,
+    DESCRIBE,
+    CALIBRATE,
+    RECORD,
 )
 
 

@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING, Any
 from jsonargparse import ArgumentParser, Namespace
 from jsonargparse.typing import NonNegativeFloat, NonNegativeInt
 
-from agents.cli.command import DONE, Command, add_trust, write_numbers
-from agents.cli.experiment import (
+from agents.cli.command import (
+    DONE,
+    Command,
     add_experiment,
+    add_trust,
     experiment_of,
     play_on_one_thread,
     prepare_bank,
+    write_numbers,
 )
 from shotenv.config import ConfigError
 

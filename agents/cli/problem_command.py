@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from jsonargparse import ArgumentParser, Namespace
 
-from agents.cli.command import DONE, Command, write_numbers
-from agents.cli.experiment import (
+from agents.cli.command import (
+    DONE,
+    Command,
     add_experiment,
     experiment_of,
     play_on_one_thread,
     prepare_bank,
+    write_numbers,
 )
 from unwrap.support import progress
 

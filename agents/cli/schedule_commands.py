@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING
 
 from jsonargparse import ArgumentParser, Namespace
 
-from agents.cli.command import DONE, Command, add_out, add_trust, write_numbers
-from agents.cli.experiment import (
+from agents.cli.command import (
+    DONE,
+    Command,
     add_experiment,
+    add_out,
+    add_trust,
     experiment_of,
     play_on_one_thread,
     prepare_bank,
+    write_numbers,
 )
 from agents.config import DemoConfig
 from shotenv.config import ConfigError, read_config

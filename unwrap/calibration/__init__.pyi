@@ -1,5 +1,6 @@
 from .bench_files import (
     BENCH_FILE as BENCH_FILE,
+    Bench as Bench,
     BenchConfig as BenchConfig,
     RecordingConfig as RecordingConfig,
     read_bench as read_bench,
@@ -17,7 +18,12 @@ from .camera_numbers import (
 from .delays import rad_per_m as rad_per_m, wall_curves as wall_curves, wall_phases as wall_phases
 from .full_well import taps_e as taps_e
 from .intervals import CONFIDENCE as CONFIDENCE, Estimate as Estimate
-from .moments import Moments as Moments, Setting as Setting, moments_of as moments_of
+from .moments import (
+    Moments as Moments,
+    MomentsInPieces as MomentsInPieces,
+    Setting as Setting,
+    moments_of as moments_of,
+)
 from .overtones import overtone_factor as overtone_factor, wiggle_columns as wiggle_columns
 from .photon_transfer import (
     ambient_e as ambient_e,

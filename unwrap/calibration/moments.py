@@ -109,27 +109,84 @@ def moments_of(
     ValueError
         Shapes that do not fit each other; the message names the recording.
     """
-    frames, frequencies, count = samples_lsb.shape[:3]
-    expected = (frames, *samples_lsb.shape[3:])
-    for name, maps in (("saturated", saturated), ("gray", gray_words)):
-        if maps is not None and maps.shape != expected:
-            raise ValueError(f"{setting.name}: {name} is {maps.shape}; expected {expected}")
-    if count != 4:
-        raise ValueError(f"{setting.name}: {count} samples a frequency; expected 4")
-    samples = samples_lsb.reshape(frames, frequencies, 4, -1)
-    mean, variance = _mean_and_variance(samples)
-    flagged = saturated.reshape(frames, -1).mean(0)
-    found = Moments(setting, frames, mean, variance.mean(1), flagged)
-    if gray_words is None:
-        return found
-    gray_mean, gray_variance = _mean_and_variance(gray_words.reshape(frames, -1))
-    return replace(found, gray_mean=gray_mean, gray_variance=gray_variance)
+    gathered = MomentsInPieces(setting.name)
+    gathered.add(samples_lsb, saturated, gray_words)
+    return gathered.of(setting)
 
 
-def _mean_and_variance(values: Array) -> tuple[Array, Array]:
-    """Over the first axis; the variance of a single frame is NaN."""
-    mean = values.mean(0, dtype=np.float64)
-    if len(values) == 1:
-        return mean, np.full_like(mean, np.nan)
-    # Of differences from the mean, and not of squares: those of float32 words would cancel.
-    return mean, np.square(values - mean).sum(0) / (len(values) - 1)
+class MomentsInPieces:
+    """Moments of a recording whose frames are taken in piece by piece.
+
+    Parameters
+    ----------
+    name : str
+        Of the recording, for what is refused.
+    cut_off : bool
+        Saturated pixels hold no samples: means and variances are of a pixel's other frames.
+    """
+
+    def __init__(self, name: str, *, cut_off: bool = False) -> None:
+        self.name, self.cut_off, self.frames = name, cut_off, 0
+        self._samples, self._gray, self._flagged = Gathered(), Gathered(), np.zeros(1)
+
+    def add(self, samples_lsb: Array, saturated: Array, gray_words: Array | None = None) -> None:
+        """Take in frames; see `moments_of` for their shapes and for what is refused."""
+        frames, _, count = samples_lsb.shape[:3]
+        expected = (frames, *samples_lsb.shape[3:])
+        for name, maps in (("saturated", saturated), ("gray", gray_words)):
+            if maps is not None and maps.shape != expected:
+                raise ValueError(f"{self.name}: {name} is {maps.shape}; expected {expected}")
+        if count != 4:
+            raise ValueError(f"{self.name}: {count} samples a frequency; expected 4")
+        flags = saturated.reshape(frames, -1)
+        samples = samples_lsb.reshape(*samples_lsb.shape[:3], -1)
+        self._samples.add(samples, ~flags if self.cut_off else None)
+        self.frames, self._flagged = self.frames + frames, self._flagged + flags.sum(0)
+        if gray_words is not None:
+            self._gray.add(gray_words.reshape(frames, -1))
+
+    def of(self, setting: Setting) -> Moments:
+        """Moments of all that was taken in."""
+        samples, gray = self._samples, self._gray
+        flagged = self._flagged / self.frames
+        found = Moments(setting, self.frames, samples.mean, samples.variance.mean(1), flagged)
+        if not np.any(gray.count):
+            return found
+        return replace(found, gray_mean=gray.mean, gray_variance=gray.variance)
+
+
+class Gathered:
+    """Mean and variance [..., P] over frames that come in pieces.
+
+    Pairwise, from differences and not from squares: those of float32 words would cancel (Chan,
+    Golub and LeVeque 1983, Algorithms for computing the sample variance).
+    """
+
+    def __init__(self) -> None:
+        self.count: Array = np.zeros(1)
+        self.mean: Array = np.zeros(1)
+        self._squares: Array = np.zeros(1)
+
+    def add(self, values: Array, used: Array | None = None) -> None:
+        """Take in frames [F, ..., P], of each pixel those that are `used` [F, P]."""
+        frames, pixels = len(values), values.shape[-1]
+        if used is None:
+            count, mean = np.full(pixels, float(frames)), values.mean(0, dtype=np.float64)
+            squares = np.square(values - mean).sum(0)
+        else:
+            weight = used.reshape(frames, *(1,) * (values.ndim - 2), pixels)
+            count = used.sum(0, dtype=np.float64)
+            mean = (values * weight).sum(0, dtype=np.float64) / np.maximum(count, 1.0)
+            squares = (np.square(values - mean) * weight).sum(0)
+        total, step = self.count + count, mean - self.mean
+        share = count / np.maximum(total, 1.0)
+        self._squares = self._squares + squares + np.square(step) * self.count * share
+        self.mean = self.mean + step * share
+        self.count = total
+
+    @property
+    def variance(self) -> Array:
+        """Unbiased; NaN of a single frame, 0 of a pixel that was used in fewer than two of many."""
+        if np.max(self.count) <= 1:
+            return np.full_like(self.mean, np.nan)
+        return self._squares / np.maximum(self.count - 1, 1.0)

@@ -18,6 +18,7 @@ def sensor_text(
     name: str,
     calibration: Calibration,
     fields: Mapping[str, str],
+    described: Mapping[str, str] | None = None,
 ) -> str:
     """Text of a sensor's YAML file: that of its kind, measured numbers in place.
 
@@ -32,8 +33,12 @@ def sensor_text(
     calibration : Calibration
     fields : mapping of str to str
         The numbers to write, and their units.
+    described : mapping of str to str
+        Fields that the camera's description tells otherwise than the base, each with what follows
+        its colon.
     """
-    written = {n: measured_line(n, fields[n], calibration) for n in fields}
+    written = {n: f"{n}: {told}" for n, told in (described or {}).items()}
+    written |= {n: measured_line(n, fields[n], calibration) for n in fields}
     written["name"] = f"name: {name}"
     if calibration.temperature_k is not None:
         written["calibration_temperature_k"] = (

@@ -10,4 +10,5 @@ from .camera_recording import (
 )
 from .canonical import quadrature_order as quadrature_order
 from .labelling import Labelling as Labelling, fitting as fitting, labellings as labellings
+from .pixel_rays import rays_of as rays_of
 from .recording_summary import Summary as Summary, summary_of as summary_of

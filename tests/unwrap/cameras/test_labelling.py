@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from camera_files import planes, small_camera, whole
 
-from agents.cli.camera_commands import labelling_lines
+from agents.cli.cameras.camera_commands import labelling_lines
 from shotenv.config.reader import find_config, read_config
 from unwrap.cameras import fitting, labellings, open_camera_recording
 from unwrap.cameras.files import CameraDescription

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jsonargparse import ArgumentParser, Namespace
 
+from agents.cli.cameras.camera_commands import read_camera
 from agents.cli.command import DONE, Command, add_json, write_numbers
 from shotenv.config import ConfigError, SensorConfig, find_config, merged, read_config
+from unwrap.signal import joint_range_m, unambiguous_range_m
 from unwrap.support import progress, write_bytes, write_text
 
 if TYPE_CHECKING:
     from unwrap.calibration import Assumed, Calibration
+    from unwrap.cameras.files import CameraDescription
 
 UNITS = {
     "gain_lsb_per_e": "LSB/e",
@@ -39,12 +43,18 @@ def calibrate_arguments(parser: ArgumentParser) -> None:
         default="epc660",
         help="name or path of a sensor configuration: frequencies, bits, and what is not measured",
     )
+    parser.add_argument(
+        "--camera",
+        metavar="NAME",
+        help="name or path of the camera's description, which tells how to read its recordings, "
+        "its frequencies, bits and lens; without it .npz, .npy or folders of PNG files",
+    )
     add_json(parser)
 
 
 def calibrate(arguments: Namespace) -> int:
     """Measure a camera; write its sensor file, tables, dark-offset map and page."""
-    from agents.report import write_calibration_page
+    from agents.report.calibration import write_calibration_page
     from unwrap.calibration import (
         BENCH_FILE,
         BenchConfig,
@@ -53,42 +63,100 @@ def calibrate(arguments: Namespace) -> int:
         sensor_text,
         stretch_of,
     )
+    from unwrap.cameras import rays_of
     from unwrap.signal import write_wiggle
 
     if arguments.out.suffix != ".yaml":
         raise ConfigError(f"out is {arguments.out}; expected a file that ends in .yaml")
     base_path = find_config("sensor", arguments.sensor)
-    base = read_config(SensorConfig, base_path)
+    kind = read_config(SensorConfig, base_path)
     config = read_config(BenchConfig, arguments.folder / BENCH_FILE)
+    camera, lens_folder = None, Path()
+    if arguments.camera is not None:
+        camera, lens_folder = read_camera(arguments.camera)
     with progress(len(config.recordings), "reading", "recording") as bar:
-        recordings, shape = read_bench(
-            config, arguments.folder, bits=base.adc_bits, tick=bar.update
+        bench = read_bench(
+            config, arguments.folder, bits=kind.adc_bits, camera=camera, tick=bar.update
         )
-    stretch = stretch_of(shape, config.horizontal_fov_deg)
-    assumed = assumed_of(base, frequencies=len(recordings[0].mean_lsb))
-    found = calibrate_camera(recordings, shape, stretch, assumed)
+    base, described = kind, dict[str, str]()
+    if camera is None:
+        stretch = stretch_of(bench.shape, config.horizontal_fov_deg)
+    else:
+        assert bench.frequencies_hz is not None  # A description tells them.
+        base, described = as_described(kind, camera, bench.frequencies_hz)
+        ahead = rays_of(camera.lens, bench.shape, lens_folder)[0]
+        stretch = (1.0 / ahead).flatten().numpy()
+    assumed = assumed_of(base, frequencies=len(bench.recordings[0].mean_lsb))
+    found = calibrate_camera(bench.recordings, bench.shape, stretch, assumed)
     held, refused = held_by_simulation(base, found)
 
     files = {
-        kind: arguments.out.with_suffix(suffix)
-        for kind, suffix in (
+        what: arguments.out.with_suffix(suffix)
+        for what, suffix in (
             ("wiggle", ".wiggle.json"),
             ("offset", ".offset.npy"),
             ("page", ".html"),
         )
     }
-    text = sensor_text(base_path.read_text(encoding="utf-8"), base.name, config.name, found, held)
+    text = sensor_text(
+        base_path.read_text(encoding="utf-8"), base.name, config.name, found, held, described
+    )
     if found.tables:
         write_wiggle(files["wiggle"], found.tables)
     if found.offset_lsb is not None:
         write_bytes(files["offset"], npy_bytes(found.offset_lsb))
-    write_calibration_page(files["page"], config, found, base, UNITS, refused)
+    write_calibration_page(files["page"], config, found, base, UNITS, refused, described)
     write_text(arguments.out, text)
     read_config(SensorConfig, arguments.out)  # as whoever simulates with it will
+    for name, told in described.items():
+        print(f"{name:24}{told}")
     tell(found, refused)
     print(f"{arguments.out}: a sensor to simulate; {files['page']}: its page")
     write_numbers(arguments, numbers_of(found, refused))
     return DONE
+
+
+def as_described(
+    kind: SensorConfig, camera: CameraDescription, frequencies_hz: tuple[float, ...]
+) -> tuple[SensorConfig, dict[str, str]]:
+    """The kind of sensor with the camera's frequencies and bits, and the fields that differ.
+
+    These as what follows their colon in a YAML file, with what they stand in place of. Ranges that
+    are not unambiguous at these frequencies end where they are.
+
+    Raises
+    ------
+    ConfigError
+        The sensor cannot have these frequencies; the message names camera and sensor.
+    """
+    told: dict[str, float] = dict(zip(("f1_hz", "f2_hz"), frequencies_hz, strict=False))
+    if not camera.words.real:
+        told["adc_bits"] = camera.words.bits
+    f1_hz, f2_hz = told["f1_hz"], told.get("f2_hz", kind.f2_hz)
+    if f2_hz >= f1_hz:
+        raise ConfigError(
+            f"sensor {kind.name} has f2_hz = {f2_hz:g} and {camera.name} records at {f1_hz:g} Hz; "
+            "expected a --sensor whose f2_hz is less"
+        )
+    ends = {
+        # As 6.2 m are of the 6.2457 m of 24 MHz: what is almost a whole wrap may be none.
+        "saturation_range_m": round(0.9927 * unambiguous_range_m(f1_hz), 4),
+        "max_range_m": round(math.floor(1e4 * joint_range_m(f1_hz, f2_hz)) / 1e4, 4),
+    }
+    told |= {name: end for name, end in ends.items() if getattr(kind, name) > end}
+    changed = {name: value for name, value in told.items() if getattr(kind, name) != value}
+    lines = {}
+    for name, value in changed.items():
+        source = f"[calc] {camera.name} is ambiguous beyond"
+        if name not in ends:
+            source = f"[described] of {camera.name}"
+        lines[name] = f"{number_of(value)}  # {source}; {kind.name} has {getattr(kind, name):g}"
+    return merged(kind, changed), lines
+
+
+def number_of(value: float) -> str:
+    """A number as YAML has it: `100.0e+6` and not `1e+08`, which YAML 1.1 takes for a word."""
+    return f"{value / 1e6!r}e+6" if value >= 1e6 else f"{value:g}"
 
 
 def assumed_of(base: SensorConfig, *, frequencies: int) -> Assumed:
@@ -156,12 +224,9 @@ def numbers_of(found: Calibration, refused: dict[str, str]) -> dict[str, Any]:
     }
 
 
-COMMANDS = (
-    Command(
-        "camera calibrate",
-        "measure a camera by its recordings: a sensor to simulate, and a page",
-        calibrate_arguments,
-        calibrate,
-    ),
+CALIBRATE = Command(
+    "camera calibrate",
+    "measure a camera by its recordings: a sensor to simulate, and a page",
+    calibrate_arguments,
+    calibrate,
 )
-"""Commands of this file."""

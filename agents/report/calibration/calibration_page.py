@@ -6,16 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import jinja2
-from plotly.offline import get_plotlyjs
-
-from agents.report.calibration_charts import charts_of
-from agents.report.charts import figure_html
+from agents.report import figure_html, page_of
+from agents.report.calibration.calibration_charts import charts_of
 from shotenv.config import SensorConfig
 from unwrap.calibration import CONFIDENCE, BenchConfig, Calibration, interval_text, number_text
 from unwrap.support import write_text
 
-PAGE = "calibration.html.jinja"
+PAGE = Path(__file__).with_name("calibration.html.jinja")
 TITLES = {
     "gain_lsb_per_e": "gain of the converter",
     "contrast": "demodulation contrast",
@@ -38,6 +35,7 @@ def write_calibration_page(
     base: SensorConfig,
     units: Mapping[str, str],
     refused: Mapping[str, str],
+    described: Mapping[str, str],
 ) -> None:
     """Write the page, self-contained.
 
@@ -53,21 +51,21 @@ def write_calibration_page(
         Of the sensor's fields, in the order of the table.
     refused : mapping of str to str
         Fields that the simulation cannot hold, and why.
+    described : mapping of str to str
+        Fields that the camera's description tells otherwise than the kind of camera.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,  # by default a misspelt name would print nothing
-    )
     rows = rows_of(found, base, units, refused)
-    text = environment.get_template(PAGE).render(
+    text = page_of(
+        PAGE,
         bench=bench,
         base=base.name,
+        described=described,
         rows=rows,
         measured=sum(row["measured"] for row in rows),
         missing=wanted(found),
         recordings=[
-            {"file": row.file, "frames": moments.frames, **row.model_dump()}
+            # What the recording itself tells stands in its setting.
+            {"frames": moments.frames, **row.model_dump(), **vars(moments.setting)}
             for row, moments in zip(bench.recordings, found.recordings, strict=True)
         ],
         tables=[f"{hz / 1e6:g} MHz" for hz in found.tables],
@@ -77,7 +75,6 @@ def write_calibration_page(
             {"title": title, "note": note, "figure": figure_html(figure)}
             for title, note, figure in charts_of(found)
         ],
-        plotly=get_plotlyjs(),  # all 4 MB of it: the page is read without a network
     )
     write_text(path, text)
 

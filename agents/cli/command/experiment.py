@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from jsonargparse import ArgumentParser, Namespace
 
-from agents.cli.command import add_config, add_json
+from agents.cli.command.command import add_config, add_json
 from agents.config import DemoConfig
 from shotenv.config import EnvConfig
 

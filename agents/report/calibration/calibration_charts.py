@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from agents.report.charts import ACCENT, AXIS, INK, LEGEND, MUTED, SHOT_COLORS, styled
+from agents.report import ACCENT, AXIS, INK, LEGEND, MUTED, SHOT_COLORS, styled
 from unwrap.calibration import (
     Calibration,
     Moments,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from jsonargparse import ArgumentParser, Namespace
 from pydantic import BaseModel
@@ -65,6 +65,16 @@ def add_json(parser: ArgumentParser) -> None:
 def add_out(parser: ArgumentParser, default: str, what: str) -> None:
     """`--out DIR`."""
     parser.add_argument("--out", type=Path, default=Path(default), metavar="DIR", help=what)
+
+
+def add_sensor_and_merge(parser: ArgumentParser) -> None:
+    """`--sensor` and `--merge`."""
+    from unwrap.depth import Merge
+
+    parser.add_argument("--sensor", default="epc660", help="name or path of a sensor configuration")
+    # Listed by its type, so that a new rule is told of here as soon as it has a name.
+    rules = ", ".join(get_args(Merge))
+    parser.add_argument("--merge", type=Merge, default="nearest", help=f"merge rule: {rules}")
 
 
 def add_trust(parser: ArgumentParser) -> None:

@@ -246,11 +246,9 @@ def _place(at: str | None, recording: CameraRecording) -> tuple[int, int]:
     return int(found[1]), int(found[2])
 
 
-COMMANDS: tuple[Command, ...] = (
-    Command(
-        "camera describe",
-        "say what is in a camera's recording, what it lacks, and which order of samples fits",
-        describe_arguments,
-        describe,
-    ),
+DESCRIBE = Command(
+    "camera describe",
+    "say what is in a camera's recording, what it lacks, and which order of samples fits",
+    describe_arguments,
+    describe,
 )

@@ -1,0 +1,1 @@
+from .calibration_page import write_calibration_page as write_calibration_page
