@@ -38,6 +38,11 @@ class DeliveredDrive:
         True radial distance; NaN where a pixel does not count.
     offset_lsb : float32 [H, W]
         Calibrated dark offset.
+    ambient_k : float
+        Around the camera.
+    shift_m : float
+        What the imager's temperature adds to every distance, compensation included. Light is
+        simulated without it, so that it is not in the samples.
     ego_speed_m_s, yaw_rate_rad_s, gray_exposure_s : float64 [F]
     """
 
@@ -46,6 +51,8 @@ class DeliveredDrive:
     frames: CameraFrames
     truth_m: Tensor
     offset_lsb: Tensor
+    ambient_k: float
+    shift_m: float
     ego_speed_m_s: Tensor
     yaw_rate_rad_s: Tensor
     gray_exposure_s: Tensor
@@ -107,6 +114,8 @@ def deliver_drive(
         ),
         truth_m=torch.cat(truth_m),
         offset_lsb=drive.offsets.calibrated_lsb[0],
+        ambient_k=float(drive.ambient_k),
+        shift_m=float(drive.drift_m),
         ego_speed_m_s=torch.from_numpy(bank.ego_speed_m_s[rows]),
         yaw_rate_rad_s=torch.from_numpy(bank.yaw_rate_rad_s[rows]),
         gray_exposure_s=torch.from_numpy(bank.gray_exposure_s[rows]),

@@ -110,7 +110,8 @@ def _write_drive(folder: Path, drive: DeliveredDrive, camera: CameraDescription)
     write_text(folder / row["ego"], "\n".join((",".join(EGO), *lines)) + "\n")
     if drive.family is not None:
         row["family"] = drive.family
-    row["seed"] = drive.seed
+    # Known of simulated drives alone: whoever imports a real one has to take it from the sensor.
+    row |= {"seed": drive.seed, "ambient_k": drive.ambient_k, "shift_m": drive.shift_m}
     told = container_of(camera).tells
     row |= {n: getattr(drive.frames, n)[0] for n in SETTINGS if n not in told}
     return row

@@ -83,14 +83,15 @@ def test_a_folder_holds_what_the_drives_delivered(problem, camera, tmp_path):
         delivered, drive = deliver_drive(problem, seed), drive_of_seed(problem, seed)
         # An archive tells its settings itself.
         assert row["seed"] == seed and "gray" not in row and "laser_power_w" not in row
+        assert row["ambient_k"] == float(drive.ambient_k)
+        assert row["shift_m"] == float(drive.drift_m) != 0.0
         found = open_camera_recording(folder / row["file"], camera).read(0, 21)
         for name in ("samples_lsb", "saturated_samples", "gray"):
             assert torch.equal(getattr(found, name), getattr(delivered.frames, name)), name
         assert found.laser_power_w == (float(drive.laser_power_w),) * 21
         assert found.integration_s == (float(drive.integration_s),) * 21
-        # To the bit the ambient temperature that it follows from, the sensor's own rise off.
         rise_k = problem.config.sensor.self_heating_k
-        assert {k - rise_k for k in found.temperature_k} == {float(drive.ambient_k)}
+        assert found.temperature_k == (float(drive.ambient_k) + rise_k,) * 21
         np.testing.assert_array_equal(np.load(folder / row["truth"]), delivered.truth_m)
         np.testing.assert_array_equal(
             np.load(folder / row["offset"]), drive.offsets.calibrated_lsb[0]
