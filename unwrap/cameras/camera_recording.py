@@ -109,12 +109,13 @@ class CameraRecording:
         """Frames as stored, where a plane is the gray image with that apart."""
         stored, passive = self.source.read(start, stop), self.camera.passive
         if passive.where == "plane" and passive.plane is not None:
-            gray, flags = stored.planes[:, passive.plane], stored.saturated
+            gray = stored.planes[:, passive.plane]
+            flags = stored.saturated
             return replace(
                 stored,
                 planes=np.delete(stored.planes, passive.plane, 1),
-                gray=gray,
                 saturated=None if flags is None else np.delete(flags, passive.plane, 1),
+                gray=gray,
             )
         if stored.gray is not None and passive.where != "recording":
             raise ValueError(

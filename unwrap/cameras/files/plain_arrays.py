@@ -15,8 +15,8 @@ from unwrap.support import in_one_line, read_npy_header
 
 PER_FRAME = ("temperature_k", "integration_s", "laser_power_w", "timestamp_s")
 KNOWN = ("dcs", "gray", "saturated", "frequencies_hz", *PER_FRAME)
-"""What an `.npz` file may hold: `dcs` are the planes, `gray` [F, H, W], `saturated` bool [F, H, W]
-or of each plane, as `dcs` lies; one number a frame the others."""
+"""What an `.npz` file may hold: `dcs` are the planes, `gray` [F, H, W], `saturated` flags of full
+taps as `dcs` or [F, H, W], one number a frame the others."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class ArrayFrames:
         return read_arrays(self.path, "dcs", KNOWN)
 
     @cached_property
-    def _planes(self) -> np.ndarray:
-        """Planes [F, P, H, W], a view."""
+    def _axes(self) -> str:
+        """Axes of the array of planes, F left out where it has none."""
         arrays, axes = self._arrays, self.camera.layout.axes
         assert axes is not None  # The description has seen to it.
         if "dcs" not in arrays:
@@ -51,11 +51,19 @@ class ArrayFrames:
         dcs = arrays["dcs"]
         # Folders of images have their own order.
         axes = ("FPHW" if dcs.ndim == 4 else "PHW") if self.path.is_dir() else axes
-        if dcs.ndim not in (len(axes), len(axes.replace("F", ""))) or 0 in dcs.shape:
+        if "F" in axes and dcs.ndim == len(axes) - 1:
+            axes = axes.replace("F", "")  # One frame, saved without its axis.
+        if dcs.ndim != len(axes) or 0 in dcs.shape:
             raise ValueError(
                 f"{self.path}: {dcs.ndim} axes, shape {dcs.shape}; expected {', '.join(axes)}"
             )
-        planes = _in_order(dcs, axes)
+        return axes
+
+    @cached_property
+    def _planes(self) -> np.ndarray:
+        """Planes [F, P, H, W], a view."""
+        axes = self._axes  # First, since it looks whether there is an array.
+        planes = _in_order(self._arrays["dcs"], axes)
         if planes.shape[1] != self.camera.stored_planes:
             raise ValueError(
                 f"{self.path}: {planes.shape[1]} planes; expected {self.camera.stored_planes} of "
@@ -86,28 +94,29 @@ class ArrayFrames:
             gray = gray[start:stop]
         told_hz = self._arrays.get("frequencies_hz")
         frequencies = None if told_hz is None else tuple(map(float, np.ravel(told_hz)))
-        planes = np.array(self._planes[start:stop])
-        flags = self._saturated()
-        if flags is not None:
-            flags = np.broadcast_to(flags[start:stop], planes.shape)
-        return StoredFrames(planes, gray, frequencies_hz=frequencies, saturated=flags, **told)
+        return StoredFrames(
+            np.array(self._planes[start:stop]),
+            gray,
+            frequencies_hz=frequencies,
+            saturated=self._saturated(start, stop),
+            **told,
+        )
 
-    def _saturated(self) -> np.ndarray | None:
-        """Flags [F, 1, H, W] of pixels or [F, P, H, W] of each plane."""
-        flags, dcs = self._arrays.get("saturated"), self._arrays["dcs"]
+    def _saturated(self, start: int, stop: int) -> np.ndarray | None:
+        """Flags [F, P, H, W], where there are some."""
+        flags = self._arrays.get("saturated")
         if flags is None:
             return None
-        frames, _, height, width = self._planes.shape
-        of_pixels = frames, height, width
-        if flags.dtype != bool or flags.shape not in (of_pixels, dcs.shape):
+        planes, axes = self._planes, self._axes
+        alone = (len(planes), *planes.shape[2:])
+        if flags.dtype == np.bool_ and flags.shape == self._arrays["dcs"].shape:
+            return _in_order(flags, axes)[start:stop]
+        if flags.dtype != np.bool_ or flags.shape != alone:
             raise ValueError(
-                f"{self.path}: saturated is {flags.dtype} {flags.shape}; expected bool "
-                f"{of_pixels}, or {dcs.shape} as dcs"
+                f"{self.path}: saturated is {flags.dtype} {flags.shape}; expected bool, as dcs or "
+                f"{alone}"
             )
-        assert self.camera.layout.axes is not None
-        if flags.shape == of_pixels:
-            return flags[:, None]
-        return _in_order(flags, self.camera.layout.axes)
+        return np.broadcast_to(flags[:, None], planes.shape)[start:stop]
 
     def _numbers(self, name: str, start: int, stop: int) -> tuple[float, ...] | None:
         """One number a frame, or one for all."""
@@ -124,11 +133,9 @@ class ArrayFrames:
 
 
 def _in_order(array: np.ndarray, axes: str) -> np.ndarray:
-    """A view [F, P, H, W] of an array whose axes are `axes`; a frame alone may lack its own."""
-    if array.ndim < len(axes):
-        axes = axes.replace("F", "")  # One frame, saved without its axis.
-    found = array.transpose([axes.index(letter) for letter in "FPHW" if letter in axes])
-    return found if "F" in axes else found[None]
+    """[F, P, H, W], a view of an array with these axes."""
+    ordered = array.transpose([axes.index(letter) for letter in "FPHW" if letter in axes])
+    return ordered if "F" in axes else ordered[None]
 
 
 def _mapped(path: Path) -> np.ndarray:
