@@ -114,26 +114,17 @@ room(
     "shotenv.sensor",
     "shotenv.bank",
 )
-room(
-    "shotenv.recorded",
-    *SIGNAL,
-    "unwrap.recordings",
-    "unwrap.cameras.files",
-    "unwrap.cameras",
-    "shotenv.config",
-    "shotenv.sensor",
-    "shotenv.bank",
-)
 room("shotenv.decision", *UNWRAPPING, *SENSING)
 room("shotenv.env", *SIGNAL, "unwrap.pictures", *SENSING, "shotenv.decision")
 room(
     "shotenv.dataset", *UNWRAPPING, "unwrap.training", "unwrap.export", *SENSING, "shotenv.decision"
 )
 room(
-    "shotenv.recording",
+    "shotenv.recorded",
     *SIGNAL,
-    "unwrap.cameras",
+    "unwrap.recordings",
     "unwrap.cameras.files",
+    "unwrap.cameras",
     "unwrap.cameras.writing",
     *SENSING,
     "shotenv.decision",

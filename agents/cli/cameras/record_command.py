@@ -37,7 +37,7 @@ def record_arguments(parser: ArgumentParser) -> None:
 def record(arguments: Namespace) -> int:
     """Write simulated drives as a camera would have recorded them."""
     from shotenv.decision import open_problem
-    from shotenv.recording import require_camera, write_drives
+    from shotenv.recorded import require_camera, write_drives
 
     config, (camera, _) = section_of(EnvConfig, arguments), read_camera(arguments.camera)
     kept = require_camera(camera, config.sensor)  # before minutes are spent

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from agents.cli.camera_commands import read_camera
 from word_banks import record, write_folder
 
+from agents.cli.cameras.camera_commands import read_camera
 from shotenv.config.keywords import env_config
 from shotenv.config.reader import find_config
 from shotenv.decision.problem import open_problem

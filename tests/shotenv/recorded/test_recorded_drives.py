@@ -12,7 +12,7 @@ from shotenv.config.sensor import SensorConfig
 from shotenv.decision.acquire import acquire_depths
 from shotenv.decision.problem import open_problem
 from shotenv.decision.transition import drive_of_seed
-from shotenv.recording import deliver_drive, write_drives
+from shotenv.recorded import deliver_drive, write_drives
 from unwrap.cameras import open_camera_recording
 from unwrap.cameras.files import CameraDescription
 from unwrap.signal.shots import Shots

@@ -11,6 +11,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,12 +21,13 @@ import yaml
 
 from shotenv.config import SensorConfig
 from shotenv.decision import Problem
-from shotenv.recording.delivered_drive import DeliveredDrive, deliver_drive
+from shotenv.recorded.bank_import import SENSOR_FILE
+from shotenv.recorded.delivered_drive import DeliveredDrive, deliver_drive
+from shotenv.recorded.recordings_file import RECORDINGS_FILE
 from unwrap.cameras.files import CameraDescription
 from unwrap.cameras.writing import container_of, kept_frequencies, write_camera_recording
 from unwrap.support import building_folder, write_text
 
-RECORDINGS, SENSOR = "recordings.yaml", "sensor.yaml"
 EGO = ("ego_speed_m_s", "yaw_rate_rad_s", "gray_exposure_s")
 SETTINGS = ("laser_power_w", "integration_s", "temperature_k")
 
@@ -85,12 +87,12 @@ def write_drives(
             for seed in seeds
         ]
         about = {
-            "name": folder.name,
+            "name": re.sub(r"[^A-Za-z0-9_-]+", "_", folder.name)[:80] or "recorded",
             "frame_rate_hz": problem.config.frame_rate_hz,
             "recordings": rows,
         }
-        _write_yaml(building / SENSOR, problem.config.sensor.model_dump(mode="json"))
-        _write_yaml(building / RECORDINGS, about)
+        _write_yaml(building / SENSOR_FILE, problem.config.sensor.model_dump(mode="json"))
+        _write_yaml(building / RECORDINGS_FILE, about)
 
 
 def _write_drive(folder: Path, drive: DeliveredDrive, camera: CameraDescription) -> dict[str, Any]:

@@ -1,5 +1,0 @@
-"""Simulated drives as a camera would have recorded them."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
