@@ -2,17 +2,17 @@
 
 <folder>/recordings.yaml        files of each drive, and what the camera does not store
 <folder>/sensor.yaml            the imager
-<folder>/drive_<seed>.*         the recording, in the camera's own format
-<folder>/drive_<seed>_gray.*    gray images, where the recording cannot hold them
-<folder>/drive_<seed>_truth.npy   true distance float32 [F, H, W], NaN where a pixel does not count
-<folder>/drive_<seed>_offset.npy  calibrated dark offset float32 [H, W], LSB
-<folder>/drive_<seed>_ego.csv   speed, yaw rate and gray exposure, a row a frame
+<folder>/<drive>.*              the recording, in the camera's own format
+<folder>/<drive>_gray.*         gray images, where the recording cannot hold them
+<folder>/<drive>_truth.npy      true distance float32 [F, H, W], NaN where a pixel does not count
+<folder>/<drive>_offset.npy     calibrated dark offset float32 [H, W], LSB
+<folder>/<drive>_ego.csv        speed, yaw rate and gray exposure, a row a frame
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -68,12 +68,17 @@ def require_camera(camera: CameraDescription, sensor: SensorConfig) -> tuple[flo
 def write_drives(
     folder: Path,
     problem: Problem,
-    seeds: Sequence[int],
+    drives: Mapping[str, int],
     camera: CameraDescription,
     *,
     tick: Callable[[int], object] = lambda frames: None,
 ) -> None:
-    """Write the drives `seeds` as the camera would have recorded them, all or nothing.
+    """Write drives as the camera would have recorded them, all or nothing.
+
+    Parameters
+    ----------
+    drives : mapping of str to int
+        Seed of each drive, by the name of its files.
 
     Raises
     ------
@@ -83,8 +88,8 @@ def write_drives(
     require_camera(camera, problem.config.sensor)
     with building_folder(folder) as building:
         rows = [
-            _write_drive(building, deliver_drive(problem, seed, tick=tick), camera)
-            for seed in seeds
+            _write_drive(building, name, deliver_drive(problem, seed, tick=tick), camera)
+            for name, seed in drives.items()
         ]
         about = {
             "name": re.sub(r"[^A-Za-z0-9_-]+", "_", folder.name)[:80] or "recorded",
@@ -95,9 +100,10 @@ def write_drives(
         _write_yaml(building / RECORDINGS_FILE, about)
 
 
-def _write_drive(folder: Path, drive: DeliveredDrive, camera: CameraDescription) -> dict[str, Any]:
+def _write_drive(
+    folder: Path, name: str, drive: DeliveredDrive, camera: CameraDescription
+) -> dict[str, Any]:
     """Write the files of a drive; its entry in the list of recordings."""
-    name = f"drive_{drive.seed}"
     written = write_camera_recording(folder, name, drive.frames, camera)
     row: dict[str, Any] = {"file": written.recording.name}
     if written.gray is not None:

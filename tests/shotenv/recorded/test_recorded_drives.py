@@ -69,7 +69,7 @@ def test_truth_is_where_the_environment_scores(problem):
 
 def test_a_folder_holds_what_the_drives_delivered(problem, camera, tmp_path):
     folder, ticks = tmp_path / "drives", []
-    write_drives(folder, problem, (SEED, SEED + 1), camera, tick=ticks.append)
+    write_drives(folder, problem, {"a": SEED, "b": SEED + 1}, camera, tick=ticks.append)
     assert sum(ticks) == 2 * 21
     about = yaml.safe_load((folder / "recordings.yaml").read_text())
     assert about["name"] == "drives" and about["frame_rate_hz"] == 10.0
@@ -103,10 +103,10 @@ def test_a_folder_holds_what_the_drives_delivered(problem, camera, tmp_path):
 
 
 def test_what_the_files_lack_is_told_beside_them(problem, tmp_path):
-    write_drives(tmp_path / "drives", problem, (SEED,), described("epc660_hdf5"))
+    write_drives(tmp_path / "drives", problem, {"a": SEED}, described("epc660_hdf5"))
     (row,) = yaml.safe_load((tmp_path / "drives" / "recordings.yaml").read_text())["recordings"]
     drive = drive_of_seed(problem, SEED)
-    assert row["file"] == f"drive_{SEED}.h5" and row["gray"] == f"drive_{SEED}_gray.h5"
+    assert row["file"] == "a.h5" and row["gray"] == "a_gray.h5"
     assert row["laser_power_w"] == float(drive.laser_power_w)
     assert row["integration_s"] == float(drive.integration_s)
     assert row["temperature_k"] == float(drive.ambient_k) + problem.config.sensor.self_heating_k
@@ -129,7 +129,7 @@ def test_all_or_nothing_and_nothing_over(problem, camera, tmp_path, monkeypatch)
     (tmp_path / "full" / "mine.txt").write_text("mine")
     before = sorted(tmp_path.iterdir())
     with pytest.raises(ValueError, match="full is not an empty folder; nothing is written over"):
-        write_drives(tmp_path / "full", problem, (SEED,), camera)
+        write_drives(tmp_path / "full", problem, {"a": SEED}, camera)
     # Half way through the second drive.
     seen = []
 
@@ -139,7 +139,9 @@ def test_all_or_nothing_and_nothing_over(problem, camera, tmp_path, monkeypatch)
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write_drives(tmp_path / "drives", problem, (SEED, SEED + 1), camera, tick=interrupted)
+        write_drives(
+            tmp_path / "drives", problem, {"a": SEED, "b": SEED + 1}, camera, tick=interrupted
+        )
     assert sorted(tmp_path.iterdir()) == before
     assert (tmp_path / "full" / "mine.txt").read_text() == "mine"
 
@@ -170,5 +172,5 @@ def test_all_or_nothing_and_nothing_over(problem, camera, tmp_path, monkeypatch)
 def test_a_camera_that_cannot_hold_the_drives_is_refused(problem, tmp_path, name, changes, error):
     camera = described(small_camera(tmp_path, name, **changes))
     with pytest.raises(ValueError, match=error):
-        write_drives(tmp_path / "drives", problem, (SEED,), camera)
+        write_drives(tmp_path / "drives", problem, {"a": SEED}, camera)
     assert not (tmp_path / "drives").exists()
