@@ -23,7 +23,7 @@ from agents.cli import (
     schedule_commands,
     unwrap_commands,
 )
-from agents.cli.cameras import CALIBRATE, CORRECT, DESCRIBE
+from agents.cli.cameras import CALIBRATE, CORRECT, DESCRIBE, RECORD
 from agents.cli.command import DONE, FAILED, INTERRUPTED, WRONG_USAGE, Command
 from shotenv.config import ConfigError, one_sentence
 
@@ -40,6 +40,7 @@ COMMANDS: tuple[Command, ...] = (
     CORRECT,
     DESCRIBE,
     CALIBRATE,
+    RECORD,
 )
 
 

@@ -1,10 +1,12 @@
-"""Recordings of cameras become banks: what is told of them, checked and put in one order and unit.
+"""Recordings of cameras become banks, and simulated drives recordings.
 
 recordings_file.py  what `recordings.yaml` tells beside the recordings
 frame_tables.py     what is told of each frame in files of their own: truth, speeds, offsets
 clip_settings.py    what a recording was made with, one number for all of its frames
 taking_in.py        one recording to the arrays of a clip, piece by piece
 bank_import.py      all of a folder, written whole or not at all, with a configuration
+delivered_drive.py  what an imager delivers of a simulated drive
+drive_folder.py     such drives as a folder of a camera's recordings
 """
 
 import lazy_loader

@@ -1,6 +1,7 @@
 from .acquisition import (
     Sensitivity as Sensitivity,
     acquire as acquire,
+    acquire_flagged as acquire_flagged,
     acquire_prefixes as acquire_prefixes,
     expose as expose,
     incident_light as incident_light,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import repeat
@@ -117,6 +117,54 @@ def acquire_prefixes(
 
     A frame of eight samples is also one of its first two and one of its first four.
     """
+    batch, height, width = light.active.shape
+    dcs_lsb = np.empty((batch, int(shots), height, width), np.float32)
+    saturated = np.zeros((batch, height, width), np.bool_)
+    taken: dict[Shots, RawFrame] = {}
+    for count in _samples_taken(light, sensor, noise, offsets, dcs_lsb, saturated):
+        if count in ACQUISITIONS:
+            # A copy: the samples to come go on marking pixels.
+            samples = torch.from_numpy(dcs_lsb[:, :count])
+            taken[Shots(count)] = RawFrame(samples, torch.from_numpy(saturated.copy()))
+    return taken
+
+
+def acquire_flagged(
+    light: IncidentLight,
+    sensor: SensorConfig,
+    *,
+    shots: Shots,
+    noise: Iterable[Tensor] | None,
+    offsets: OffsetPattern | None,
+) -> tuple[Tensor, Tensor]:
+    """As `acquire`, with a flag for each sample: both [B, n, H, W], float32 in LSB and bool.
+
+    A pixel of `RawFrame` is saturated where any of its samples is.
+    """
+    batch, height, width = light.active.shape
+    dcs_lsb = np.empty((batch, int(shots), height, width), np.float32)
+    saturated, flags = np.zeros((batch, height, width), np.bool_), np.empty(dcs_lsb.shape, np.bool_)
+    for count in _samples_taken(light, sensor, noise, offsets, dcs_lsb, saturated):
+        flags[:, count - 1] = saturated
+        saturated[:] = False
+    return torch.from_numpy(dcs_lsb), torch.from_numpy(flags)
+
+
+def _samples_taken(
+    light: IncidentLight,
+    sensor: SensorConfig,
+    noise: Iterable[Tensor] | None,
+    offsets: OffsetPattern | None,
+    dcs_lsb: np.ndarray,
+    saturated: np.ndarray,
+) -> Iterator[int]:
+    """Write sample after sample into `dcs_lsb` [B, n, H, W], marking `saturated` [B, H, W].
+
+    Yields
+    ------
+    int
+        How many are taken.
+    """
     shape = batch, height, width = light.active.shape
     pixel = pixel_of(sensor)
     if offsets is None:
@@ -126,8 +174,6 @@ def acquire_prefixes(
     if noise is None:
         pixel = pixel._replace(shot_noise=np.float32(0))
         noise = repeat(torch.zeros(batch, 2, height, width))
-    dcs_lsb = np.empty((batch, int(shots), height, width), np.float32)
-    saturated = np.zeros(shape, np.bool_)
     # A compiled loop does not broadcast, and reads on where an array ends: shapes are made equal
     # here, where a wrong one is still an error.
     pattern_lsb = array(offsets.pattern_lsb.expand(shape))
@@ -138,14 +184,9 @@ def acquire_prefixes(
     )
     fixed = long_rows(pattern_lsb), long_rows(row_parity(height, width)), pixel
     made = long_rows(dcs_lsb), long_rows(saturated)
-    taken: dict[Shots, RawFrame] = {}
-    for number, normals in zip(range(shots), noise, strict=False):
+    for number, normals in zip(range(dcs_lsb.shape[1]), noise, strict=False):
         take_sample_(number, lit, long_rows(array(normals)), *fixed, *made)
-        if number + 1 in ACQUISITIONS:
-            # A copy: the samples to come go on marking pixels.
-            samples = torch.from_numpy(dcs_lsb[:, : number + 1])
-            taken[Shots(number + 1)] = RawFrame(samples, torch.from_numpy(saturated.copy()))
-    return taken
+        yield number + 1
 
 
 @lru_cache(maxsize=16)

@@ -37,6 +37,13 @@ room("unwrap.recordings", *UNWRAPPING, "unwrap.pictures", "unwrap.ros")
 room("unwrap.cameras.files", "unwrap.support", "unwrap.signal", "unwrap.recordings")
 room("unwrap.cameras", *UNWRAPPING, "unwrap.recordings", "unwrap.cameras.files")
 room(
+    "unwrap.cameras.writing",
+    *SIGNAL,
+    "unwrap.recordings",
+    "unwrap.cameras.files",
+    "unwrap.cameras",
+)
+room(
     "unwrap.calibration",
     *SIGNAL,
     "unwrap.depth",
@@ -107,20 +114,20 @@ room(
     "shotenv.sensor",
     "shotenv.bank",
 )
+room("shotenv.decision", *UNWRAPPING, *SENSING)
+room("shotenv.env", *SIGNAL, "unwrap.pictures", *SENSING, "shotenv.decision")
+room(
+    "shotenv.dataset", *UNWRAPPING, "unwrap.training", "unwrap.export", *SENSING, "shotenv.decision"
+)
 room(
     "shotenv.recorded",
     *SIGNAL,
     "unwrap.recordings",
     "unwrap.cameras.files",
     "unwrap.cameras",
-    "shotenv.config",
-    "shotenv.sensor",
-    "shotenv.bank",
-)
-room("shotenv.decision", *UNWRAPPING, *SENSING)
-room("shotenv.env", *SIGNAL, "unwrap.pictures", *SENSING, "shotenv.decision")
-room(
-    "shotenv.dataset", *UNWRAPPING, "unwrap.training", "unwrap.export", *SENSING, "shotenv.decision"
+    "unwrap.cameras.writing",
+    *SENSING,
+    "shotenv.decision",
 )
 room(
     "shotenv.live",
@@ -186,7 +193,7 @@ ONLY_IN = {
     "onnx": ("unwrap/export/", "agents/deploy/"),
     "onnxruntime": ("unwrap/export/", "agents/deploy/"),
     "openvino": "unwrap/networks/",
-    "h5py": "unwrap/cameras/files/",
+    "h5py": ("unwrap/cameras/files/", "unwrap/cameras/writing/"),
 }
 SOURCES = sorted(
     path.relative_to(ROOT).as_posix()

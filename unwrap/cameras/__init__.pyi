@@ -9,6 +9,7 @@ from .camera_recording import (
     open_camera_recording as open_camera_recording,
     turned as turned,
 )
+from .canonical import quadrature_order as quadrature_order
 from .labelling import Labelling as Labelling, fitting as fitting, labellings as labellings
 from .pixel_rays import rays_of as rays_of
 from .recording_summary import Summary as Summary, summary_of as summary_of

@@ -30,7 +30,7 @@ def canonical(planes: np.ndarray, samples: SamplesConfig) -> tuple[np.ndarray, b
     >>> found.ravel().tolist(), made
     ([10.0, 20.0, 30.0, 40.0], False)
     """
-    if (places := _places(samples)) is not None:
+    if (places := quadrature_order(samples)) is not None:
         return planes[..., places, :, :], False
     cosine, sine = np.moveaxis(_fitted(planes, samples), -3, 0)
     return np.stack((cosine, sine, -cosine, -sine), axis=-3), True
@@ -41,12 +41,12 @@ def in_order(saturated: np.ndarray, samples: SamplesConfig) -> np.ndarray:
 
     Of a phasor that is made of several planes a saturated one spoils all four.
     """
-    if (places := _places(samples)) is not None:
+    if (places := quadrature_order(samples)) is not None:
         return saturated[..., places, :, :]
     return np.repeat(saturated.any(axis=-3, keepdims=True), len(QUADRATURE), axis=-3)
 
 
-def _places(samples: SamplesConfig) -> list[int] | None:
+def quadrature_order(samples: SamplesConfig) -> list[int] | None:
     """Planes that are the canonical samples, in their order; None where they have to be made."""
     phases = samples.phases_deg
     if samples.kind == "samples":

@@ -10,6 +10,7 @@ from .compiled import (
 )
 from .error_text import in_one_line as in_one_line
 from .files import (
+    building_folder as building_folder,
     replacing as replacing,
     write_bytes as write_bytes,
     write_json as write_json,

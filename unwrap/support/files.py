@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -34,6 +35,28 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     except BaseException:  # Ctrl-C, too, must leave nothing lying about.
         Path(name).unlink(missing_ok=True)
         raise
+
+
+@contextmanager
+def building_folder(folder: Path) -> Iterator[Path]:
+    """A folder to fill, which becomes `folder` at the end, or leaves nothing.
+
+    Raises
+    ------
+    ValueError
+        `folder` is there and not empty.
+    """
+    if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
+        raise ValueError(f"{folder} is not an empty folder; nothing is written over")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    # Beside it: a folder can only be renamed within its file system.
+    building = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+    try:
+        building.chmod(0o755)  # mkdtemp makes folders that only their owner may enter.
+        yield building
+        building.replace(folder)
+    finally:
+        shutil.rmtree(building, ignore_errors=True)
 
 
 def write_bytes(path: Path, content: bytes) -> None:

@@ -92,10 +92,14 @@ def decode_packet(content: np.ndarray) -> np.ndarray:
     words = np.zeros(bits.shape[:-1], np.uint16)
     for place in range(11):  # One bit of all words at a time, which takes least memory.
         words |= bits[..., place].astype(np.uint16) << place
-    row, column = np.arange(HEIGHT), np.arange(WIDTH)
-    half = HEIGHT // 2
-    stored_row = np.where(row < half, row + half, HEIGHT - 1 - row)
-    stored_column = (column >> 2) + ((column & 3) << 7)
+    stored_row, stored_column = stored_places()
     images = expanded()[words[:, stored_row][..., stored_column]]
     images[..., [0, -1]] = 0
     return images
+
+
+def stored_places() -> tuple[np.ndarray, np.ndarray]:
+    """Row [424] and column [512] of the stored image where each of the image's lies."""
+    row, column = np.arange(HEIGHT), np.arange(WIDTH)
+    half = HEIGHT // 2
+    return np.where(row < half, row + half, HEIGHT - 1 - row), (column >> 2) + ((column & 3) << 7)

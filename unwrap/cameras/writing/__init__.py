@@ -1,0 +1,5 @@
+"""Frames as files of a described camera: the inverse of reading them."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
