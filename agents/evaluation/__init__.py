@@ -1,4 +1,4 @@
-"""Policies played on the same drives, compared in pairs; what there is to win."""
+"""Policies compared on the same drives."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Policies: what chooses the shots of a frame from the observation."""
+"""What chooses the shots of a frame from the observation."""
 
 import lazy_loader
 

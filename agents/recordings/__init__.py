@@ -1,4 +1,6 @@
-"""Schedulers judged on recordings that tell less than simulated drives: no reference, four samples.
+"""Schedulers judged on recordings.
+
+Those tell less than simulated drives: there may be no reference, or four samples alone.
 
 Where distances are scored against a reference and eight samples were recorded, recordings are
 judged as any drives are, by `agents.evaluation`.

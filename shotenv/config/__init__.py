@@ -1,4 +1,4 @@
-"""Typed configuration: one frozen model per folder of `configs/`, and the YAML reader.
+"""Typed configuration: a frozen model per folder of `configs/`.
 
 | files | model | a new field goes into |
 |---|---|---|

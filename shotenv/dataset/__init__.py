@@ -1,4 +1,4 @@
-"""Frames of a bank as networks are trained and judged on them."""
+"""A bank's frames as networks learn from them."""
 
 import lazy_loader
 

@@ -47,19 +47,8 @@ def write_wire(file: BinaryIO, stored: StoredFrames, camera: CameraDescription) 
 
         def header(kind: int | None, low_us: int = low_us, centi: int = centi) -> bytes:
             region = 0, 0, width, height
-            fields = (
-                WIRE_VERSION,
-                kind,
-                width,
-                height,
-                *region,
-                low_us,
-                0,
-                0,
-                centi,
-                WIRE_HEADER.size,
-            )
-            return WIRE_HEADER.pack(*fields)
+            told = low_us, 0, 0, centi, WIRE_HEADER.size
+            return WIRE_HEADER.pack(WIRE_VERSION, kind, width, height, *region, *told)
 
         if stored.gray is not None:
             file.write(header(layout.gray_type) + stored.gray[frame].astype("<u2").tobytes())
