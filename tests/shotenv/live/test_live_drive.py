@@ -271,6 +271,7 @@ def test_settings_that_do_not_fit_are_refused(tiny_unwrapper):
         LiveShotScheduleEnv(camera, unwrapper=tiny_unwrapper, offset_lsb=torch.zeros(24, 31))
     for changes, told in (
         ({"integration_s": 1.5e-6}, "integration_s is 1.5e-06; expected whole microseconds"),
+        ({"laser_power_w": 0.0}, "laser_power_w is 0.0; expected watts above 0"),
         ({"integration_s": 0.1}, "integration_s is 0.1; expected whole microseconds"),
         ({"frequencies_hz": (24e6, 11e6)}, "frequencies_hz has 1.1e.07; expected one of"),
     ):
