@@ -1,4 +1,4 @@
-"""Recordings of cameras become banks: what is told of them, checked and put in one order and unit.
+"""Cameras' recordings as banks.
 
 recordings_file.py  what `recordings.yaml` tells beside the recordings
 frame_tables.py     what is told of each frame in files of their own: truth, speeds, offsets
