@@ -17,7 +17,7 @@ from agents.cli.command import (
     section_of,
     write_numbers,
 )
-from shotenv.config import BankConfig, ConfigError
+from shotenv.config import BankConfig, ConfigError, find_config
 from unwrap.support import progress, say, write_bytes
 
 
@@ -151,6 +151,42 @@ def write_thinned_bank(arguments: Namespace) -> int:
     return DONE
 
 
+def import_arguments(parser: ArgumentParser) -> None:
+    """Which recordings of which camera, and where to."""
+    parser.add_argument("folder", type=Path, help="folder of recordings, and recordings.yaml")
+    parser.add_argument("--camera", required=True, help="name or path of a camera's description")
+    parser.add_argument("--sensor", default="epc660", help="name or path of a sensor configuration")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write")
+    parser.add_argument(
+        "--truth",
+        choices=["external", "own", "none"],
+        help="what distances are scored against: references that recordings.yaml names, the depth "
+        "of the eight samples, or nothing; the first that can be had",
+    )
+    add_json(parser)
+
+
+def import_recordings(arguments: Namespace) -> int:
+    """Make a bank of a camera's recordings."""
+    from agents.cli.camera_commands import read_camera
+    from shotenv.bank.listing import contents_of, print_contents
+    from shotenv.recorded import import_bank
+
+    camera, _ = read_camera(arguments.camera)
+    bank = import_bank(
+        arguments.folder,
+        camera,
+        find_config("sensor", arguments.sensor),
+        arguments.out,
+        truth=arguments.truth,
+    )
+    about = contents_of(bank)
+    print_contents(about)
+    print(f"{bank.folder / 'env.yaml'}: an environment that plays it")
+    write_numbers(arguments, about)
+    return DONE
+
+
 def light_arguments(parser: ArgumentParser) -> None:
     """Which bank and split, by which laser, and the network that reads its gray images."""
     parser.add_argument("bank", nargs="?", default="starter", help="name or path of a bank")
@@ -194,6 +230,12 @@ COMMANDS = (
         render_arguments,
         render_bank,
         resumes=True,
+    ),
+    Command(
+        "bank import",
+        "make a bank of a camera's recordings",
+        import_arguments,
+        import_recordings,
     ),
     Command(
         "bank info",

@@ -1,4 +1,4 @@
-"""Pages from the templates of this room."""
+"""Pages from templates, in the style of `page.css`."""
 
 from __future__ import annotations
 
@@ -12,12 +12,19 @@ CANNOT_SHOW: Final = (KeyError, IndexError, TypeError, jinja2.UndefinedError)
 """What results of another version raise on their way into a page."""
 
 
-def page_of(name: str, **values: Any) -> str:
-    """The template `name` filled in; `values` are escaped unless it says that they are safe."""
+ROOM: Final = Path(__file__).parent
+
+
+def page_of(template: str | Path, **values: Any) -> str:
+    """A template of this room, or a file, filled in.
+
+    `values` are escaped unless it says that they are safe; what it includes is of this room.
+    """
+    path = ROOM / template
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        loader=jinja2.FileSystemLoader((path.parent, ROOM)),
         autoescape=True,
         undefined=jinja2.StrictUndefined,  # by default a misspelt name would print nothing
     )
     # All 4 MB of plotly: pages are read without a network.
-    return environment.get_template(name).render(plotly=get_plotlyjs(), **values)
+    return environment.get_template(path.name).render(plotly=get_plotlyjs(), **values)

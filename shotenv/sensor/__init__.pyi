@@ -12,6 +12,7 @@ from .acquisition import (
 from .converter import full_scale_lsb as full_scale_lsb
 from .description import description_of as description_of
 from .drift import (
+    distance_drift_m as distance_drift_m,
     imager_temperature_k as imager_temperature_k,
     residual_drift_m as residual_drift_m,
 )

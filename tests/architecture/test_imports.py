@@ -140,6 +140,7 @@ room(
     "agents.training",
 )
 room("agents.report", *PLAYING, "unwrap.calibration", "unwrap.pictures", "agents.evaluation")
+room("agents.report.recordings", *PLAYING, "agents.evaluation", "agents.report")
 room("agents.deploy", *SIGNAL, "agents.policies")
 room("agents", "agents.policies", "agents.evaluation", "agents.training")
 room("agents.cli", *ROOMS)

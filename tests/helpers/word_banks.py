@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import torch
+import yaml
 from torch import Tensor
 
 from shotenv.bank.bank import Clip
@@ -138,6 +140,72 @@ def record(problem: Problem, seed: int, *, name: str = "recorded") -> Recorded:
         ),
         facts=facts,
     )
+
+
+def flags_of(raws: dict[Shots, RawFrame]) -> np.ndarray:
+    """A flag of each of eight samples [F, 8, H, W] by which prefixes are flagged as they are."""
+    eight = raws[Shots.EIGHT].saturated.numpy()
+    flags = np.zeros((len(eight), 8, *eight.shape[1:]), bool)
+    for shots, raw in raws.items():
+        # That it came with the last of them does not show in a prefix.
+        flags[:, shots - 1] = raw.saturated.numpy()
+    return flags
+
+
+CAMERA = """name: bench
+container: arrays
+layout: {axes: FPHW}
+words: {bits: 12, signed: true}
+samples: {phase_deg: [0, 90, 180, 270]}
+passive: {where: recording, highest: 4095}
+lens: {horizontal_fov_deg: 60}
+"""
+"""A camera that stores what is recorded of a drive, in plain arrays."""
+
+
+def write_folder(
+    folder: Path, recorded: Sequence[Recorded], *, samples: int = 8, truth: bool = True, **common
+) -> Path:
+    """Recordings as `bank import` takes them, and all that is told beside them: `folder`."""
+    hertz = "[24.0e+6, 10.0e+6]" if samples == 8 else "[24.0e+6]"
+    folder.mkdir(parents=True)
+    (folder / "camera").mkdir()
+    (folder / "camera" / "bench.yaml").write_text(f"{CAMERA}frequencies_hz: {hertz}\n")
+    rows = []
+    for number, one in enumerate(recorded):
+        name, facts = f"drive_{number}", one.facts
+        eight = one.raws[Shots.EIGHT]
+        np.savez(
+            folder / f"{name}.npz",
+            dcs=eight.dcs_lsb[:, :samples].numpy().astype(np.int16),
+            gray=one.gray.numpy(),
+            saturated=flags_of(one.raws)[:, :samples],
+            timestamp_s=100.0 + 0.1 * np.arange(len(one.gray)),
+        )
+        np.save(folder / f"{name}_truth.npy", one.truth_m.numpy())
+        np.save(folder / f"{name}_offset.npy", one.settings.offset_lsb.numpy())
+        columns = ("ego_speed_m_s", "yaw_rate_rad_s", "gray_exposure_s")
+        table = [",".join(columns)]
+        for row in zip(*(getattr(facts, column) for column in columns), strict=True):
+            table.append(",".join(map(repr, row)))
+        (folder / f"{name}_ego.csv").write_text("\n".join(table) + "\n")
+        rows.append(
+            {
+                "file": f"{name}.npz",
+                **({"truth": f"{name}_truth.npy"} if truth else {}),
+                "ego": f"{name}_ego.csv",
+                "offset": f"{name}_offset.npy",
+                "family": facts.family,
+                "seed": facts.seed,
+                **{
+                    field: getattr(one.settings, field)
+                    for field in ("laser_power_w", "integration_s", "ambient_k", "shift_m")
+                },
+            }
+        )
+    told = {"name": "bench", "recordings": rows, **common}
+    (folder / "recordings.yaml").write_text(yaml.safe_dump(told))
+    return folder
 
 
 def replayed_problem(simulated: Problem, recorded: Sequence[Recorded], **kind) -> Problem:

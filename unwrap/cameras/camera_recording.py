@@ -86,6 +86,8 @@ class CameraRecording:
         camera, where = self.camera, str(self.source.path)
         stored, names = self._without_gray_plane(start, stop), self.names[start:stop]
         samples, saturated = samples_of(stored.planes, camera, where, names)
+        if stored.saturated is not None:
+            saturated = saturated | stored.saturated
         frequencies = self._frequencies(stored)
         by_frequency = samples.reshape(len(names), len(frequencies), -1, *samples.shape[2:])
         ordered, made = canonical(by_frequency, camera.samples)
@@ -108,7 +110,13 @@ class CameraRecording:
         stored, passive = self.source.read(start, stop), self.camera.passive
         if passive.where == "plane" and passive.plane is not None:
             gray = stored.planes[:, passive.plane]
-            return replace(stored, planes=np.delete(stored.planes, passive.plane, 1), gray=gray)
+            flags = stored.saturated
+            return replace(
+                stored,
+                planes=np.delete(stored.planes, passive.plane, 1),
+                saturated=None if flags is None else np.delete(flags, passive.plane, 1),
+                gray=gray,
+            )
         if stored.gray is not None and passive.where != "recording":
             raise ValueError(
                 f"{self.source.path}: gray images are in the recording; expected none, as "

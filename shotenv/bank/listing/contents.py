@@ -10,6 +10,7 @@ from shotenv.bank import (
     SHIPPED,
     THINNED_CONTENTS,
     Bank,
+    RecordedBank,
     ThinnedBank,
     bank_bytes,
     bank_folder,
@@ -51,7 +52,7 @@ def _shipped(folder: Path) -> dict[str, Any]:
 
 
 def _bytes_in(folder: Path) -> int:
-    return sum(path.stat().st_size for path in folder.iterdir())
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
 
 
 def _planned(config: BankConfig) -> dict[str, Any]:
@@ -109,13 +110,14 @@ def contents_of(bank: Bank) -> dict[str, Any]:
         "height": bank.height,
         "bytes": _bytes_of(bank),
         "thinned": _thinning_of(bank) if isinstance(bank, ThinnedBank) else None,
+        "recorded": _recording_of(bank) if isinstance(bank, RecordedBank) else None,
         "splits": splits,
         "config": None if bank.config is None else bank.config.model_dump(mode="json"),
     }
 
 
 def _bytes_of(bank: Bank) -> int:
-    if bank.is_thinned:
+    if isinstance(bank, ThinnedBank | RecordedBank):
         return _bytes_in(bank.folder)
     # Without headers and records, which are less than a thousandth of it.
     return len(bank) * frame_bytes(bank.height, bank.width)
@@ -132,6 +134,26 @@ def _thinning_of(bank: ThinnedBank) -> dict[str, Any]:
     }
 
 
+def _recording_of(bank: RecordedBank) -> dict[str, Any]:
+    """What recordings are of, what they answer and what they are scored against."""
+    about = bank.manifest
+    return {
+        "camera": about.camera,
+        "sensor": about.sensor.name,
+        "frame_rate_hz": about.frame_rate_hz,
+        "answers": [int(shots) for shots in bank.answers],
+        "truth": about.truth,
+        "made": about.made,
+    }
+
+
+TRUTHS = {
+    "external": "external, a reference",
+    "own": "their own eight samples, where both frequencies agree",
+    "none": "none: no error is told",
+}
+
+
 def print_contents(about: dict[str, Any]) -> None:
     """The `contents_of` a bank, as words and a table."""
     print(
@@ -142,6 +164,14 @@ def print_contents(about: dict[str, Any]) -> None:
     print(f"  rendered     {_settings(about['config'])}")
     if about["thinned"] is not None:
         print(f"  thinned      {_told(about['thinned'])}")
+    if (recorded := about["recorded"]) is not None:
+        answers = ", ".join(map(str, recorded["answers"]))
+        made = ", made of phasors" if recorded["made"] else ""
+        print(
+            f"  recorded     by {recorded['camera']} at {recorded['frame_rate_hz']:g} Hz, played "
+            f"as {recorded['sensor']}; answers {answers} DCS{made}"
+        )
+        print(f"  truth        {TRUTHS[recorded['truth']]}")
     print()
     _print_counts(about["splits"])
 

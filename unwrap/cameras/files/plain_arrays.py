@@ -14,9 +14,9 @@ from unwrap.recordings import read_arrays, read_png_folder
 from unwrap.support import in_one_line, read_npy_header
 
 PER_FRAME = ("temperature_k", "integration_s", "laser_power_w", "timestamp_s")
-KNOWN = ("dcs", "gray", "frequencies_hz", *PER_FRAME)
-"""What an `.npz` file may hold: `dcs` are the planes, `gray` [F, H, W], one number a frame the
-others."""
+KNOWN = ("dcs", "gray", "saturated", "frequencies_hz", *PER_FRAME)
+"""What an `.npz` file may hold: `dcs` are the planes, `gray` [F, H, W], `saturated` flags of full
+taps as `dcs` or [F, H, W], one number a frame the others."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class ArrayFrames:
         return read_arrays(self.path, "dcs", KNOWN)
 
     @cached_property
-    def _planes(self) -> np.ndarray:
-        """Planes [F, P, H, W], a view."""
+    def _axes(self) -> str:
+        """Axes of the array of planes, F left out where it has none."""
         arrays, axes = self._arrays, self.camera.layout.axes
         assert axes is not None  # The description has seen to it.
         if "dcs" not in arrays:
@@ -57,9 +57,13 @@ class ArrayFrames:
             raise ValueError(
                 f"{self.path}: {dcs.ndim} axes, shape {dcs.shape}; expected {', '.join(axes)}"
             )
-        order = [axes.index(letter) for letter in "FPHW" if letter in axes]
-        planes = dcs.transpose(order)
-        planes = planes if "F" in axes else planes[None]
+        return axes
+
+    @cached_property
+    def _planes(self) -> np.ndarray:
+        """Planes [F, P, H, W], a view."""
+        axes = self._axes  # First, since it looks whether there is an array.
+        planes = _in_order(self._arrays["dcs"], axes)
         if planes.shape[1] != self.camera.stored_planes:
             raise ValueError(
                 f"{self.path}: {planes.shape[1]} planes; expected {self.camera.stored_planes} of "
@@ -91,8 +95,28 @@ class ArrayFrames:
         told_hz = self._arrays.get("frequencies_hz")
         frequencies = None if told_hz is None else tuple(map(float, np.ravel(told_hz)))
         return StoredFrames(
-            np.array(self._planes[start:stop]), gray, frequencies_hz=frequencies, **told
+            np.array(self._planes[start:stop]),
+            gray,
+            frequencies_hz=frequencies,
+            saturated=self._saturated(start, stop),
+            **told,
         )
+
+    def _saturated(self, start: int, stop: int) -> np.ndarray | None:
+        """Flags [F, P, H, W], where there are some."""
+        flags = self._arrays.get("saturated")
+        if flags is None:
+            return None
+        planes, axes = self._planes, self._axes
+        alone = (len(planes), *planes.shape[2:])
+        if flags.dtype == np.bool_ and flags.shape == self._arrays["dcs"].shape:
+            return _in_order(flags, axes)[start:stop]
+        if flags.dtype != np.bool_ or flags.shape != alone:
+            raise ValueError(
+                f"{self.path}: saturated is {flags.dtype} {flags.shape}; expected bool, as dcs or "
+                f"{alone}"
+            )
+        return np.broadcast_to(flags[:, None], planes.shape)[start:stop]
 
     def _numbers(self, name: str, start: int, stop: int) -> tuple[float, ...] | None:
         """One number a frame, or one for all."""
@@ -106,6 +130,12 @@ class ArrayFrames:
                 f"{frames}, one for each frame"
             )
         return tuple(map(float, np.broadcast_to(array, frames)[start:stop]))
+
+
+def _in_order(array: np.ndarray, axes: str) -> np.ndarray:
+    """[F, P, H, W], a view of an array with these axes."""
+    ordered = array.transpose([axes.index(letter) for letter in "FPHW" if letter in axes])
+    return ordered if "F" in axes else ordered[None]
 
 
 def _mapped(path: Path) -> np.ndarray:

@@ -30,12 +30,15 @@ class StoredFrames:
         Passive images, stored numbers.
     frequencies_hz : tuple of float or None
         In the order of the planes; None where the file does not tell.
+    saturated : bool [F, P, H, W] or None
+        Samples that the camera flags beside their words: taps that were full.
     temperature_k, integration_s, laser_power_w, timestamp_s : tuple of F floats or None
     """
 
     planes: np.ndarray
     gray: np.ndarray | None = None
     frequencies_hz: tuple[float, ...] | None = None
+    saturated: np.ndarray | None = None
     temperature_k: tuple[float, ...] | None = None
     integration_s: tuple[float, ...] | None = None
     laser_power_w: tuple[float, ...] | None = None
