@@ -1,4 +1,4 @@
-"""Cameras' recordings as banks.
+"""Recordings as banks.
 
 recordings_file.py  what `recordings.yaml` tells beside the recordings
 frame_tables.py     what is told of each frame in files of their own: truth, speeds, offsets
