@@ -65,16 +65,16 @@ PLACES = {
     "agents.cli": Box(374, 626, 900, 954),
     "agents.cli.command": Box(424, 519, 926, 949),
     "agents.cli.cameras": Box(525, 620, 926, 949),
-    "agents.report": Box(30, 114, *TOP),
-    "agents.report.calibration": Box(33, 111, 739, 759),
-    "agents.recordings": Box(120, 238, *TOP),
-    "agents.evaluation": Box(244, 364, *TOP),
-    "agents.optimum": Box(370, 474, *TOP),
-    "agents.training": Box(480, 580, *TOP),
-    "agents.study": Box(586, 668, *TOP),
-    "agents.config": Box(674, 762, *TOP),
-    "agents.deploy": Box(768, 852, *TOP),
-    "agents.policies": Box(858, 970, *TOP),
+    "agents.report": Box(30, 134, *TOP),
+    "agents.report.calibration": Box(36, 128, 764, 784),
+    "agents.report.recordings": Box(36, 128, 740, 760),
+    "agents.evaluation": Box(140, 264, *TOP),
+    "agents.optimum": Box(270, 396, *TOP),
+    "agents.training": Box(400, 530, *TOP),
+    "agents.study": Box(536, 628, *TOP),
+    "agents.config": Box(634, 742, *TOP),
+    "agents.deploy": Box(748, 836, *TOP),
+    "agents.policies": Box(842, 970, *TOP),
     "shotenv.world": Box(30, 178, FRONT[0], BACK[1]),
     "shotenv.world.families": Box(40, 168, 484, 510),
     "shotenv.world.things": Box(40, 168, 452, 478),
@@ -83,16 +83,16 @@ PLACES = {
     "shotenv.render": Box(186, 312, FRONT[0], 573),
     "shotenv.render.surfaces": Box(196, 302, 452, 478),
     "shotenv.render.backend": Box(196, 302, 420, 446),
-    "shotenv.bank": Box(320, 456, *BACK),
-    "shotenv.bank.listing": Box(330, 446, 533, 552),
-    "shotenv.sensor": Box(320, 456, *FRONT),
-    "shotenv.config": Box(490, 622, *BACK),
-    "shotenv.recorded": Box(628, 724, *BACK),
-    "shotenv.dataset": Box(730, 818, *BACK),
+    "shotenv.bank": Box(320, 456, 516, BACK[1]),
+    "shotenv.bank.listing": Box(330, 446, 521, 543),
+    "shotenv.sensor": Box(320, 456, FRONT[0], 510),
+    "shotenv.config": Box(490, 666, *BACK),
+    "shotenv.dataset": Box(674, 818, *BACK),
     "shotenv.laser": Box(490, 650, *FRONT),
     "shotenv.decision": Box(658, 818, *FRONT),
-    "shotenv.live": Box(826, 950, 566, BACK[1]),
-    "shotenv.env": Box(826, 950, FRONT[0], 559),
+    "shotenv.env": Box(826, 950, FRONT[0], 512),
+    "shotenv.recorded": Box(826, 950, 517, 577),
+    "shotenv.live": Box(826, 950, 582, BACK[1]),
     "unwrap.cameras": Box(30, 144, *MAIN),
     "unwrap.cameras.files": Box(36, 85, 179, 202),
     "unwrap.cameras.writing": Box(90, 139, 179, 202),
@@ -123,7 +123,7 @@ JOINING: tuple[Points, ...] = (
     ((540, MIDDLE), (636, MIDDLE)),
 )
 """Recordings of a real camera, and what the shots cost, join it."""
-CHOICE: Points = ((872, TOP[0]), (872, 684), (473, 684), (473, 467), (458, 467))
+CHOICE: Points = ((845, TOP[0]), (845, 684), (473, 684), (473, 467), (458, 467))
 """The way of the action back to the sensor."""
 DOORS: dict[str, tuple[float, float]] = {
     "shotenv.world": (104, MIDDLE),
@@ -137,13 +137,13 @@ DOORS: dict[str, tuple[float, float]] = {
     "shotenv.decision": (744, MIDDLE),
     "shotenv.env": (888, MIDDLE),
     "agents.policies": (900, UPPER),
-    "agents.evaluation": (304, UPPER),
+    "agents.evaluation": (240, UPPER),
     "agents.report": (90, UPPER),
 }
 """Where rooms open to the hallway."""
 HEADS: tuple[tuple[str, tuple[float, float]], ...] = (
     *((">", (127, MIDDLE)), (">", (282, LOWER)), (">", (466, LOWER)), (">", (936, MIDDLE))),
-    *(("^", (966, 540)), ("<", (740, UPPER)), ("<", (420, UPPER))),
+    *(("^", (966, 540)), ("<", (740, UPPER)), ("<", (400, UPPER))),
 )
 """Which way it goes."""
 VALUES: dict[str, tuple[float, float]] = {

@@ -90,7 +90,7 @@ def evaluate(arguments: Namespace) -> int:
     """Judge a trained scheduler."""
     from agents.evaluation import check_study, evaluate_scheduler
     from agents.policies import load_policy
-    from agents.recordings import tells_less
+    from agents.report.recordings import tells_less
 
     # Loaded first: a folder without a scheduler is refused before a bank is rendered.
     scheduler = load_policy(arguments.scheduler, trust=arguments.trust)
@@ -120,8 +120,8 @@ def publish(arguments: Namespace, config: DemoConfig, evaluation: Evaluation) ->
 def publish_recordings(arguments: Namespace, config: DemoConfig, scheduler: Scheduler) -> int:
     """Judge a scheduler on recordings that tell less than simulated drives, and publish that."""
     from agents.evaluation import drive_rows
-    from agents.recordings import evaluate_recordings, recorded_lines, write_recorded_report
     from agents.report import DRIVES, RESULTS, write_drives
+    from agents.report.recordings import evaluate_recordings, recorded_lines, write_recorded_report
 
     if arguments.budget is not None:
         raise ConfigError(
@@ -153,8 +153,8 @@ def report_arguments(parser: ArgumentParser) -> None:
 
 def report(arguments: Namespace) -> int:
     """Write the page of an evaluation anew, or one that compares several."""
-    from agents.recordings import write_recorded_report
     from agents.report import RESULTS, read_json, write_comparison, write_report
+    from agents.report.recordings import write_recorded_report
 
     folders, out = arguments.results, arguments.out
     if len(folders) > 1:

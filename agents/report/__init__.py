@@ -1,4 +1,4 @@
-"""Results as files, charts and one page."""
+"""Results as charts and pages."""
 
 import lazy_loader
 

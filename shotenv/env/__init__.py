@@ -1,4 +1,7 @@
-"""Gymnasium's faces of the decision problem: one drive, or many in a batch."""
+"""Gymnasium's faces of the decision problem.
+
+One drive, or many in a batch.
+"""
 
 import lazy_loader
 

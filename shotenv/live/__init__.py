@@ -1,4 +1,4 @@
-"""A live camera in place of a bank.
+"""A live camera as a bank.
 
 The same choices from the same features as in `shotenv.env`, of frames as they come.
 """

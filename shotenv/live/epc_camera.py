@@ -17,6 +17,7 @@ import math
 import select
 import socket
 import struct
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
@@ -68,13 +69,13 @@ class EpcCamera:
     size : (int, int), optional
         Rows and columns; those of the description without.
     timeout_s : float
-        Longest silence that is waited out.
+        Longest time from a command to its whole answer, and from there to a whole image.
 
     Raises
     ------
     ValueError
         A frequency that the camera has no code for, an integration time that its commands cannot
-        tell, or a description of another kind of camera.
+        tell, no laser power, or a description of another kind of camera.
     """
 
     def __init__(
@@ -95,6 +96,8 @@ class EpcCamera:
         self._camera = _checked(description)
         self._codes = tuple(_code_of(hz) for hz in frequencies_hz)
         self._integration_us = _microseconds(integration_s)
+        if not 0 < laser_power_w < math.inf:
+            raise ValueError(f"laser_power_w is {laser_power_w!r}; expected watts above 0")
         layout = description.layout
         self._stored_size = size or (layout.height or 0, layout.width or 0)
         self._socket: socket.socket | None = None
@@ -148,8 +151,10 @@ class EpcCamera:
 
     def temperature_k(self) -> float:
         """Temperature of the imager, kelvin."""
-        (centi_celsius,) = struct.unpack("!h", self._command(GET_TEMPERATURE, answer=TEMPERATURE))
-        return centi_celsius / 100 + CELSIUS_K
+        told = self._command(GET_TEMPERATURE, answer=TEMPERATURE)
+        if len(told) != 2:
+            raise DamagedFrameError(f"{self.name}: temperature has {len(told)} bytes; expected 2")
+        return struct.unpack("!h", told)[0] / 100 + CELSIUS_K
 
     def close(self) -> None:
         """Close the connection, if there is one."""
@@ -202,6 +207,7 @@ class EpcCamera:
         """Send a command, and give the data of its answer."""
         self._refuse_leftovers()
         payload = (struct.pack("!H", number) + data).ljust(PAYLOAD_BYTES, b"\x00")
+        self._connected().settimeout(self._timeout_s)
         try:
             self._connected().sendall(
                 struct.pack("!II", START, len(payload)) + payload + struct.pack("!I", END)
@@ -242,13 +248,16 @@ class EpcCamera:
     def _received(self, count: int, what: str) -> bytes:
         """Exactly `count` bytes of `what`."""
         content, received = bytearray(count), 0
+        latest_s = time.monotonic() + self._timeout_s
         while received < count:
+            # Of all together: a camera that goes on to send a byte now and then is none that works.
+            self._connected().settimeout(max(latest_s - time.monotonic(), 1e-3))
             try:
                 new = self._connected().recv_into(memoryview(content)[received:])
             except TimeoutError:
                 if received:
                     raise TruncatedFrameError(
-                        f"{self.name}: {what} stopped after {received} of {count} bytes for "
+                        f"{self.name}: {received} of {count} bytes of the {what} within "
                         f"{self._timeout_s:g} s"
                     ) from None
                 raise CameraTimeoutError(

@@ -1,4 +1,4 @@
-"""Recordings as banks, and drives as recordings.
+"""Recordings as banks, and back.
 
 recordings_file.py  what `recordings.yaml` tells beside the recordings
 frame_tables.py     what is told of each frame in files of their own: truth, speeds, offsets

@@ -154,7 +154,7 @@ room(
     "agents.training",
 )
 room("agents.report", *PLAYING, "unwrap.pictures", "agents.evaluation")
-room("agents.recordings", *PLAYING, "agents.evaluation", "agents.report")
+room("agents.report.recordings", *PLAYING, "agents.evaluation", "agents.report")
 room(
     "agents.report.calibration",
     *SIGNAL,

@@ -75,11 +75,11 @@ BAD = {
     ),
     "cut off": (
         *(SAMPLES, lambda reply: reply[:2000]),
-        *(TruncatedFrameError, "frame of 4 samples stopped after 1962 of 6144 bytes for 0.3 s"),
+        *(TruncatedFrameError, "1962 of 6144 bytes of the frame of 4 samples within 0.3 s"),
     ),
     "cut off in the header": (
         *(GRAY, lambda reply: reply[: ANSWER_BYTES + 11]),
-        *(TruncatedFrameError, "gray image stopped after 11 of 25 bytes"),
+        *(TruncatedFrameError, "11 of 25 bytes of the gray image within 0.3 s"),
     ),
     "no answer as described": (
         *(GRAY, lambda reply: b"HTTP/1.1 400 Bad Request"),
@@ -141,6 +141,35 @@ def test_what_is_left_of_an_earlier_answer_is_not_taken_for_the_next():
         with pytest.raises(StaleFrameError, match="100 bytes or more of an earlier answer"):
             camera.acquire(Shots.TWO)
         camera.close()
+
+
+def test_a_camera_that_drips_is_not_waited_for():
+    class Dripping(example_module("emulated_camera").EmulatedCamera):
+        def reply(self, number, data):
+            reply = super().reply(number, data)
+            if number != GRAY:
+                return reply
+            for byte in reply:
+                self._connection.sendall(bytes((byte,)))
+                time.sleep(TIMEOUT_S / 10)
+            return None
+
+    with Dripping(frames()) as server, closing(client_of(server, timeout_s=TIMEOUT_S)) as camera:
+        camera.start()
+        began_s = time.monotonic()
+        with pytest.raises(TruncatedFrameError, match=r"bytes of the .* within"):
+            camera.next_frame()
+        assert time.monotonic() - began_s < 5 * TIMEOUT_S
+
+
+def test_a_temperature_of_another_length_is_none():
+    def longer(reply):
+        return example_module("emulated_camera").answer(4, b"\x00\x01\x02")
+
+    with bad_camera(74, longer) as server, closing(client_of(server)) as camera:
+        camera.start()
+        with pytest.raises(DamagedFrameError, match="temperature has 3 bytes; expected 2"):
+            camera.temperature_k()
 
 
 def test_an_answer_that_comes_too_late_does_not_become_that_of_the_next_frame():

@@ -100,7 +100,9 @@ def begin_both(env, integration_us, make_server, **keywords):
             deliver=lambda depth, shots: delivered.append((depth, shots)),
             **{"stale_s": 60.0, **keywords},
         )
-        start = {"laser_k": float(drive.start_k), "drive": info["drive_seed"]}
+        start = {"drive": info["drive_seed"]}
+        if "laser" not in keywords:
+            start["laser_k"] = float(drive.start_k)
         seen, told = live.reset(options=start)
         return Pair(env, live, [observation, seen], [info, told], delivered)
 
@@ -246,6 +248,20 @@ def test_a_second_drive_begins_with_the_laser_as_the_first_left_it(bank_env):
         pair.live.close()
 
 
+def test_a_laser_about_to_trip_takes_no_samples(bank_env):
+    laser = {"ambient_k": [283.15, 293.3], "trip_k": 294.0, "release_k": 293.5}
+    server, begin = begin_both(bank_env, DARK_US, emulated(), laser=laser)
+    with server:
+        live = begin().live
+        live.reset(options={"laser_k": 293.999})
+        before = len(server.requests)
+        _, _, _, _, info = live.step(0)
+        assert (info["asked"], info["shots"], info["laser_energy_j"]) == (2, 0, 0.0)
+        assert [kind for kind, _ in server.requests[before:]] == ["gray"]
+        assert live.times.samples_s == live.times.chosen_s
+        live.close()
+
+
 def test_settings_that_do_not_fit_are_refused(tiny_unwrapper):
     class Server:
         port = 1
@@ -255,6 +271,7 @@ def test_settings_that_do_not_fit_are_refused(tiny_unwrapper):
         LiveShotScheduleEnv(camera, unwrapper=tiny_unwrapper, offset_lsb=torch.zeros(24, 31))
     for changes, told in (
         ({"integration_s": 1.5e-6}, "integration_s is 1.5e-06; expected whole microseconds"),
+        ({"laser_power_w": 0.0}, "laser_power_w is 0.0; expected watts above 0"),
         ({"integration_s": 0.1}, "integration_s is 0.1; expected whole microseconds"),
         ({"frequencies_hz": (24e6, 11e6)}, "frequencies_hz has 1.1e.07; expected one of"),
     ):

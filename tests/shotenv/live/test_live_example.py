@@ -43,11 +43,11 @@ def test_what_comes_nearer_does_so_at_the_street_s_speed():
     live = example()
     ahead = live.rays(SIZE)[2]
     before, after = (live.seen(live.rays(SIZE), time_s)[0] for time_s in (0.0, 0.1))
-    nearer = (before - after) * ahead
     # On the front of the tunnel, straight ahead.
     front = np.abs(before * ahead - (live.TUNNEL_M[0] - 0.3)) < 0.01
     assert front.any()
-    np.testing.assert_allclose(nearer[front], 0.1 * live.SPEED_M_S, atol=1e-6)
+    nearer_m = (before[front] - after[front]) * ahead[front]
+    np.testing.assert_allclose(nearer_m, 0.1 * live.SPEED_M_S, atol=1e-6)
 
 
 def test_the_example_tells_stages_rate_and_energy():
