@@ -134,7 +134,7 @@ def test_hidden_numbers_are_found_in_a_cameras_own_files(name, tmp_path, capsys)
         assert (
             "f1_hz                   100.0e+6  # [described] of imx556; epc660 has 2.4e+07" in told
         )
-        assert "f1_hz: 100.0e+6 (" in page
+        assert "says f1_hz 100.0e+6, f2_hz 20.0e+6, saturation" in page
         assert sensor.f2_hz == 20e6 and sensor.max_range_m == 7.4948
 
 
