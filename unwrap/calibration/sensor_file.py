@@ -46,6 +46,8 @@ def sensor_text(
             "recordings in the dark and of the wall"
         )
     lines = list(_header(name, base_name, calibration))
+    if described:
+        lines.append("# [described]: told by the camera's description, in place of what is named.")
     for line in base_text.splitlines():
         found = FIELD.match(line)
         lines.append(written.pop(found[1], line) if found else line)
@@ -75,7 +77,6 @@ def interval_text(estimate: Estimate) -> str:
 
 def _header(name: str, base_name: str, calibration: Calibration) -> Iterator[str]:
     """What the marks mean, and what no field of the file can say."""
-    percent = f"{100 * CONFIDENCE:g} %"
     percent = f"{100 * CONFIDENCE:g} %"
     yield f"# {name}: [measured] by its own recordings, with {percent} intervals; what a number"
     yield "# leans on and was not measured is named (given ...). Lines with other marks are those"

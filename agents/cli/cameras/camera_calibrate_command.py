@@ -12,7 +12,7 @@ from jsonargparse import ArgumentParser, Namespace
 from agents.cli.cameras.camera_commands import read_camera
 from agents.cli.command import DONE, Command, add_json, write_numbers
 from shotenv.config import ConfigError, SensorConfig, find_config, merged, read_config
-from unwrap.signal import joint_range_m, unambiguous_range_m
+from unwrap.signal import joint_range_m
 from unwrap.support import progress, write_bytes, write_text
 
 if TYPE_CHECKING:
@@ -121,8 +121,8 @@ def as_described(
 ) -> tuple[SensorConfig, dict[str, str]]:
     """The kind of sensor with the camera's frequencies and bits, and the fields that differ.
 
-    These as what follows their colon in a YAML file, with what they stand in place of. Ranges that
-    are not unambiguous at these frequencies end where they are.
+    These as what follows their colon in a YAML file, with what they stand in place of. The range of
+    trusted wrapped distances follows the frequency; what is unwrapped ends with the joint range.
 
     Raises
     ------
@@ -139,15 +139,16 @@ def as_described(
             "expected a --sensor whose f2_hz is less"
         )
     ends = {
-        # As 6.2 m are of the 6.2457 m of 24 MHz: what is almost a whole wrap may be none.
-        "saturation_range_m": round(0.9927 * unambiguous_range_m(f1_hz), 4),
-        "max_range_m": round(math.floor(1e4 * joint_range_m(f1_hz, f2_hz)) / 1e4, 4),
+        # The same share of a wrap: what is almost a whole one may be none.
+        "saturation_range_m": round(kind.saturation_range_m * kind.f1_hz / f1_hz, 4),
+        # To a tenth of a millimetre, downwards: beyond the joint range is refused.
+        "max_range_m": min(kind.max_range_m, math.floor(1e4 * joint_range_m(f1_hz, f2_hz)) / 1e4),
     }
-    told |= {name: end for name, end in ends.items() if getattr(kind, name) > end}
+    told |= ends
     changed = {name: value for name, value in told.items() if getattr(kind, name) != value}
     lines = {}
     for name, value in changed.items():
-        source = f"[calc] {camera.name} is ambiguous beyond"
+        source = f"[described] by the frequencies of {camera.name}"
         if name not in ends:
             source = f"[described] of {camera.name}"
         lines[name] = f"{number_of(value)}  # {source}; {kind.name} has {getattr(kind, name):g}"

@@ -12,7 +12,9 @@ import pytest
 from calibration_bench import example
 
 from agents.cli import main
-from shotenv.config import SensorConfig, merged, read_config
+from agents.cli.cameras.camera_calibrate_command import as_described
+from agents.cli.cameras.camera_commands import read_camera
+from shotenv.config import SensorConfig, find_config, merged, read_config
 from unwrap.signal import read_wiggle
 
 SEED, TRAILER = 5, bytes(396)
@@ -132,7 +134,7 @@ def test_hidden_numbers_are_found_in_a_cameras_own_files(name, tmp_path, capsys)
         assert (
             "f1_hz                   100.0e+6  # [described] of imx556; epc660 has 2.4e+07" in told
         )
-        assert "f1_hz: 100.0e+6 (" in page
+        assert "says f1_hz 100.0e+6, f2_hz 20.0e+6, saturation" in page
         assert sensor.f2_hz == 20e6 and sensor.max_range_m == 7.4948
 
 
@@ -177,6 +179,21 @@ def test_another_cameras_description_is_refused(name, camera, sentence, tmp_path
 def rewritten(folder, **top):
     path = folder / "calibration.yaml"
     path.write_text(json.dumps(json.loads(path.read_text()) | top))
+
+
+def test_ranges_follow_the_frequencies():
+    epc660 = read_config(SensorConfig, find_config("sensor", "epc660"))
+    camera, _ = read_camera("epc660_hdf5")
+    assert as_described(epc660, camera, (24e6,)) == (epc660, {})
+    slow, lines = as_described(epc660, camera, (12e6,))
+    assert slow == merged(epc660, {"f1_hz": 12e6, "saturation_range_m": 12.4})
+    assert lines == {
+        "f1_hz": "12.0e+6  # [described] of epc660 (HDF5); epc660 has 2.4e+07",
+        "saturation_range_m": "12.4  # [described] by the frequencies of epc660 (HDF5); epc660 has "
+        "6.2",
+    }
+    fast, _ = as_described(epc660, camera, (100e6, 20e6))
+    assert (fast.saturation_range_m, fast.max_range_m) == (1.488, 7.4948)
 
 
 def test_phasors_tell_neither_offsets_nor_noise(tmp_path, capsys):
