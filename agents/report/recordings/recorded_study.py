@@ -89,7 +89,7 @@ def evaluate_recordings(
         if shots not in answers
     ]
     rules: dict[str, Policy] = {}
-    if (why := without_tuning(config.env)) is not None:
+    if (why := without_tuning(problem)) is not None:
         left_out.append(why)
     else:
         tuned = tune_families(config)

@@ -98,7 +98,8 @@ def test_the_commands_tell_what_it_is_and_check_it(bank, folder, tmp_path, capsy
     assert about["splits"] == {"test": {"street": 2 * FRAMES}}
     sheet = tmp_path / "sheet.png"
     assert main(["bank", "info", str(out), "--sheet", str(sheet)]) == 0
-    assert Image.open(sheet).size[0] > 100
+    with Image.open(sheet) as image:
+        assert image.size[0] > 100
     assert "bench at 10 Hz" in capsys.readouterr().out
     assert main(["bank", "verify", str(out)]) == 0
     # The same recordings with another truth are another bank of the same words.
