@@ -25,6 +25,7 @@ from unwrap.support import say, write_json
 
 if TYPE_CHECKING:
     from agents.evaluation import Evaluation
+    from agents.policies import Scheduler
 
 COMPARISON = Path("runs/comparison.html")
 
@@ -89,6 +90,7 @@ def evaluate(arguments: Namespace) -> int:
     """Judge a trained scheduler."""
     from agents.evaluation import check_study, evaluate_scheduler
     from agents.policies import load_policy
+    from agents.report.recordings import tells_less
 
     # Loaded first: a folder without a scheduler is refused before a bank is rendered.
     scheduler = load_policy(arguments.scheduler, trust=arguments.trust)
@@ -96,6 +98,8 @@ def evaluate(arguments: Namespace) -> int:
     check_study(config, scheduler)
     prepare_bank(config.env)
     play_on_one_thread()
+    if tells_less(config):
+        return publish_recordings(arguments, config, scheduler)
     found = evaluate_scheduler(config, scheduler, budget_j=arguments.budget)
     return publish(arguments, config, found)
 
@@ -109,6 +113,27 @@ def publish(arguments: Namespace, config: DemoConfig, evaluation: Evaluation) ->
     page = write_report(arguments.out)
     write_numbers(arguments, results)
     told = "\n".join((verdict(results), *details(results), *budget_lines(results)))
+    print(f"\n{told}\n\nReport: {page.resolve()}")
+    return DONE
+
+
+def publish_recordings(arguments: Namespace, config: DemoConfig, scheduler: Scheduler) -> int:
+    """Judge a scheduler on recordings that tell less than simulated drives, and publish that."""
+    from agents.evaluation import drive_rows
+    from agents.report import DRIVES, RESULTS, write_drives
+    from agents.report.recordings import evaluate_recordings, recorded_lines, write_recorded_report
+
+    if arguments.budget is not None:
+        raise ConfigError(
+            f"budget is {arguments.budget:g}; expected none with recordings that have no "
+            "reference, no eight samples, or one clip"
+        )
+    results, played = evaluate_recordings(config, scheduler)
+    write_drives(arguments.out / DRIVES, drive_rows(played))
+    write_json(arguments.out / RESULTS, results)
+    page = write_recorded_report(results, arguments.out)
+    write_numbers(arguments, results)
+    told = "\n".join(recorded_lines(results))
     print(f"\n{told}\n\nReport: {page.resolve()}")
     return DONE
 
@@ -128,13 +153,18 @@ def report_arguments(parser: ArgumentParser) -> None:
 
 def report(arguments: Namespace) -> int:
     """Write the page of an evaluation anew, or one that compares several."""
-    from agents.report import write_comparison, write_report
+    from agents.report import RESULTS, read_json, write_comparison, write_report
+    from agents.report.recordings import write_recorded_report
 
     folders, out = arguments.results, arguments.out
     if len(folders) > 1:
         print(write_comparison(folders, out or COMPARISON))
     elif out is None:
-        print(write_report(folders[0]))
+        results = read_json(folders[0] / RESULTS)
+        if "recordings" in results:
+            print(write_recorded_report(results, folders[0]))
+        else:
+            print(write_report(folders[0]))
     else:
         raise ConfigError(
             f"out is {out}; expected with several folders alone: the page of one evaluation is "

@@ -30,6 +30,7 @@ from .study import (
     price_of as price_of,
     table_fronts as table_fronts,
     tune_families as tune_families,
+    without_tuning as without_tuning,
 )
 from .summary import (
     PACKAGES as PACKAGES,

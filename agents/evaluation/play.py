@@ -13,7 +13,7 @@ from agents.config import StudyConfig
 from agents.optimum import by_clip, clairvoyant, tabulate
 from agents.policies import Action, FixedPolicy, Observation, Policy
 from shotenv.config import EnvConfig
-from shotenv.decision import Problem
+from shotenv.decision import Problem, answered_actions
 from shotenv.env import ShotScheduleVectorEnv
 from unwrap.signal import Shots
 
@@ -102,15 +102,17 @@ temperature_k : float64 [N, T]
         frames = self.shots.shape[1]
         lit = self.shots > 0
         every, pairs = np.ones_like(lit), ~np.isnan(self.temporal_error_m)
+        # What recordings cannot be scored against is not known with laser either.
+        known = lit & ~np.isnan(self.depth_mae_m)
         # Over frames with laser: one without has no depth. The return counts it in full.
         counted = {
             "return": (frames * self.reward, every),
             "laser_energy_j": (frames * self.laser_energy_j, every),
             "energy_j": (frames * self.energy_j, every),
             "life_used_h": (frames * self.life_used_h, every),
-            "depth_mae_m": (self.depth_mae_m, lit),
-            "wrap_accuracy": (self.wrap_accuracy, lit),
-            "within_0p1m": (self.within_0p1m, lit),
+            "depth_mae_m": (self.depth_mae_m, known),
+            "wrap_accuracy": (self.wrap_accuracy, known),
+            "within_0p1m": (self.within_0p1m, known),
             "temporal_error_m": (self.temporal_error_m, pairs),
             "tripped_share": (~lit, every),
         }
@@ -209,8 +211,12 @@ def play_drives(
     # All drives are equally long: they end in the same step, and no frame of a next one is kept.
     frames: list[dict[str, np.ndarray]] = []
     done = np.zeros(len(seeds), dtype=bool)
+    allowed = answered_actions(unwrapped.problem).numpy()
     while not done.all():
-        actions = policy.act(observations, infos)
+        if allowed.all():
+            actions = policy.act(observations, infos)
+        else:
+            actions = policy.act_among(observations, infos, allowed)
         features = observations["state"] if isinstance(observations, Mapping) else observations
         seen = np.array(features, dtype=np.float32)
         observations, rewards, terminated, truncated, infos = envs.step(actions)

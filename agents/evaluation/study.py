@@ -87,6 +87,14 @@ def price_of(config: EnvConfig) -> float:
     return low if low == high else float(np.sqrt(low * high))  # rounding would make it another
 
 
+def without_tuning(env: EnvConfig) -> str | None:
+    """Why no rule can be tuned, where that is so: a sentence, or None."""
+    bank = open_problem(env.model_copy(update={"split": "all"})).bank
+    if any(clip.split == "validation" for clip in bank.clips):
+        return None
+    return f"tuned rules: bank {bank.name} has no validation clips to tune them on"
+
+
 def tune_families(config: DemoConfig) -> dict[str, dict[float, Tuned]]:
     """Each family's best at each price of the study, and at that of the drives.
 
@@ -185,7 +193,9 @@ def evaluate_scheduler(
     plays = Plays(envs, drive_seeds(study, study.drives))
     if budget_j is not None:
         check_budget(budget_j, plays)
-    tuned = tune_families(config)
+    # Simulated banks have all splits; recordings may not.
+    untuned = without_tuning(config.env)
+    tuned = {} if untuned else tune_families(config)
     rules = {name: found[price_of(config.env)].policy for name, found in tuned.items()}
     policies = {
         SCHEDULER: scheduler,
@@ -211,6 +221,9 @@ def evaluate_scheduler(
     results["fronts"] = {name: front.rows for name, front in shown.items()}
     if budget_j is not None:
         results["budget"] = judge_budget(budget_j, config, scheduler, tuned, plays)
+    results["recorded"] = problem.bank.is_recorded
+    results["truth"] = problem.bank.truth_level
+    results["left_out"] = [untuned] if untuned else []
     results["algorithm"] = scheduler.provenance.algorithm
     # Every how many pixels each way: only of all of them there are images.
     results["every"] = problem.bank.every

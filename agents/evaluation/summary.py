@@ -26,7 +26,8 @@ PACKAGES: Final = (
 
 def best_fixed(played: Mapping[str, PlayedDrives]) -> str:
     """Name of the fixed choice with the highest mean return on these drives."""
-    return max(FIXED_POLICIES, key=lambda name: played[name].reward.sum())
+    fixed = [name for name in FIXED_POLICIES if name in played]
+    return max(fixed, key=lambda name: played[name].reward.sum())
 
 
 def best_rival(played: Mapping[str, PlayedDrives], scheduler: str) -> str:
@@ -51,6 +52,8 @@ def summary(
     drive_s : float
         How long a drive takes, seconds.
     """
+    # 8 DCS, or the most that was recorded.
+    most = [name for name in FIXED_POLICIES if name in played][-1]
     # Both are picked on the drives that are judged, which favours them, not the scheduler.
     fixed, rival = best_fixed(played), best_rival(played, scheduler)
     families = sorted(set(played[fixed].family.ravel().tolist()))
@@ -62,7 +65,7 @@ def summary(
                     for measure, (total, count) in one.per_clip().items()
                 },
                 "shots_share": one.shots_share(),
-                "life_factor": life_factor(one, played["always_8"], study).named("mean"),
+                "life_factor": life_factor(one, played[most], study).named("mean"),
                 **tails(one, drive_s),
             }
             for name, one in played.items()
@@ -125,23 +128,31 @@ def tails(one: PlayedDrives, drive_s: float) -> dict[str, Any]:
         drives, some of the measures.
     """
     lit = one.shots > 0
+    known = lit & ~np.isnan(one.depth_mae_m)
     error_m, frames = one.per_clip()["depth_mae_m"]
     # A clip without any laser has no error.
     worst = int(np.argmax(np.where(frames > 0, error_m / np.maximum(frames, 1.0), -np.inf)))
     number = np.unique(one.clip)[worst]
     return {
-        "depth_mae_p95_m": float(np.quantile(one.depth_mae_m[lit], 0.95)) if lit.any() else None,
+        "depth_mae_p95_m": float(np.quantile(one.depth_mae_m[known], 0.95))
+        if known.any()
+        else None,
         "worst_clip": {
             "clip": int(number),
             "family": str(one.family[one.clip == number][0]),
             "depth_mae_m": float(error_m[worst] / max(frames[worst], 1.0)),
-        },
+        }
+        if known.any()
+        else None,
         "highest_temperature_k": float(one.temperature_k.max()),
         # Joules a second are watt-hours an hour.
         "laser_wh_per_h": float(one.per_drive["laser_energy_j"].mean() / drive_s),
         "tripped_drives_share": float((~lit).any(axis=1).mean()),
         "median": {
-            name: float(np.median(one.per_drive[name]))
+            # JSON knows no NaN.
+            name: None
+            if np.isnan(one.per_drive[name]).any()
+            else float(np.median(one.per_drive[name]))
             for name in ("return", "laser_energy_j", "life_used_h", "depth_mae_m")
         },
     }

@@ -18,6 +18,7 @@ from shotenv.decision import (
     Drive,
     Outcomes,
     Problem,
+    answered_actions,
     drive_of_seed,
     outcomes_of_all_actions,
     weighted,
@@ -84,6 +85,8 @@ class Possible:
         # price is relative to the energy of always 8 DCS.
         laser_j = heat_j / (1.0 - laser.efficiency)
         whole_j = np.array([float(drive.always_eight.energy_j) for drive in self.drives])
+        # What was not recorded cannot be chosen.
+        cost[..., ~answered_actions(self.problem).numpy()] = np.inf
         return DriveTable(
             cost=cost,
             reference=reference,

@@ -88,11 +88,14 @@ def tabulate_temporal_errors(
     float64 [N, T, A, A]
         Metres; [n, t, i, j] of action i in frame t - 1 and j in frame t. NaN in the first frame of
         a drive and of each clip, and where nothing stands still. All NaN with a derated laser: what
-        that would measure depends on the choices before.
+        that would measure depends on the choices before; and of recordings without a reference or
+        eight samples.
     """
     frames = problem.config.frames_per_drive
     found = np.full((len(seeds), frames, len(Shots), len(Shots)), np.nan)
-    if problem.config.laser.derate_per_k:
+    bank = problem.bank
+    scored = bank.truth_level == "external" and len(bank.answers) == len(Shots)
+    if problem.config.laser.derate_per_k or not scored:
         return found
     # All drives side by side: maps of two steps are all that is kept.
     drives = concatenate([drive_of(problem, seed) for seed in seeds])

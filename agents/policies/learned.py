@@ -112,6 +112,12 @@ class NetworkPolicy(Policy):
         """The action of the highest score, the first of equal ones."""
         return single(self.scores(observation).argmax(axis=-1))
 
+    def act_among(
+        self, observation: Observation, info: Mapping[str, Any] | None, allowed: np.ndarray
+    ) -> Action:
+        """The allowed action of the highest score."""
+        return single(np.where(allowed, self.scores(observation), -np.inf).argmax(axis=-1))
+
     def save(self, folder: Path) -> None:
         """Write `policy.safetensors`, then `agent.json`, each atomically."""
         description = Description(

@@ -41,6 +41,16 @@ class Policy(ABC):
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
         """Action of one environment, or int64 [N] of a batch of N."""
 
+    def act_among(
+        self, observation: Observation, info: Mapping[str, Any] | None, allowed: np.ndarray
+    ) -> Action:
+        """`act`, of the actions `allowed`, bool [3], alone: the next fewer samples in their place.
+
+        The fewest are always allowed.
+        """
+        lower = np.maximum.accumulate(np.where(allowed, np.arange(len(allowed)), 0))
+        return single(lower[self.act(observation, info)])
+
     def reset(self) -> None:  # noqa: B027 - most policies remember nothing
         """Forget everything: the next `act` is the first of new drives."""
 

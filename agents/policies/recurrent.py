@@ -129,6 +129,12 @@ class RecurrentPolicy(Policy):
         """The action of the highest score, the first of equal ones; the frame is remembered."""
         return single(self.scores(observation).argmax(axis=-1))
 
+    def act_among(
+        self, observation: Observation, info: Mapping[str, Any] | None, allowed: np.ndarray
+    ) -> Action:
+        """The allowed action of the highest score."""
+        return single(np.where(allowed, self.scores(observation), -np.inf).argmax(axis=-1))
+
     def reset(self) -> None:
         """Forget the drives: hidden and cell states begin at 0."""
         self._remembered = None

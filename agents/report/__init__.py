@@ -1,4 +1,4 @@
-"""Results as files, charts and one page."""
+"""Results as files, charts, pages."""
 
 import lazy_loader
 

@@ -13,6 +13,13 @@ from .comparison import write_comparison as write_comparison
 from .evaluation_files import write_evaluation as write_evaluation
 from .page import write_report as write_report
 from .rerun_file import require_rerun as require_rerun, write_recording as write_recording
+from .results import (
+    DRIVES as DRIVES,
+    RESULTS as RESULTS,
+    label as label,
+    read_json as read_json,
+    write_drives as write_drives,
+)
 from .scoreboard import lines_of as lines_of, match_picture as match_picture
 from .strip import take_strip as take_strip
-from .template import page_of as page_of
+from .template import CANNOT_SHOW as CANNOT_SHOW, page_of as page_of

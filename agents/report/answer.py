@@ -59,6 +59,9 @@ def details(results: dict[str, Any]) -> list[str]:
             f"The scheduler was trained at one price, {answer['prices'][0]:g}, and has no knob: "
             "its front is that point mixed with fixed choices."
         )
+    if results.get("recorded"):
+        told.append("Drives are recordings, scored against the reference that came with them.")
+    told += [f"Left out: {sentence}." for sentence in results.get("left_out", ())]
     return told
 
 

@@ -168,6 +168,11 @@ class Bank(ABC):
         return self.manifest.width
 
     @property
+    def is_recorded(self) -> bool:
+        """Whether a camera delivered its frames; see `WordBank`."""
+        return False
+
+    @property
     def answers(self) -> tuple[Shots, ...]:
         """Acquisitions that frames can be taken with, ascending; of light all."""
         return tuple(Shots)

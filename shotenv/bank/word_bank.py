@@ -53,6 +53,11 @@ class WordBank(Bank):
     """
 
     @property
+    def is_recorded(self) -> bool:
+        """See `Bank.is_recorded`."""
+        return True
+
+    @property
     @abstractmethod
     def truth_level(self) -> TruthLevel:
         """What distances are scored against."""

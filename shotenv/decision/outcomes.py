@@ -14,7 +14,7 @@ from shotenv.decision.measurement import Measurement, lost_depth, measure_frames
 from shotenv.decision.problem import Problem
 from shotenv.decision.rewards import reference_terms, reward, reward_terms
 from shotenv.decision.score import DepthScore
-from shotenv.decision.transition import SHOTS_OF_ACTION, cost_of
+from shotenv.decision.transition import SHOTS_OF_ACTION, answered_actions, cost_of
 from unwrap.support import concatenate, mapped, take
 
 ACTIONS = len(SHOTS_OF_ACTION)
@@ -25,6 +25,8 @@ MOST_PIXELS = 2**20
 @dataclass(frozen=True)
 class Outcomes:
     """What each action would bring in each frame of one drive, with a working laser at 25 C.
+
+    Of recordings that do not answer an action what it would bring is NaN, but for energy and heat.
 
     Attributes
     ----------
@@ -95,11 +97,20 @@ def _measure_all(problem: Problem, drive: Drive) -> Measurement:
     They share the noise of the longest, as the frames of fewer samples are prefixes of it.
     """
     frames = problem.config.frames_per_drive
-    steps = torch.arange(frames).repeat_interleave(ACTIONS)
-    shots = SHOTS_OF_ACTION.repeat(frames)
+    # The fewest samples are always answered.
+    answered = int(answered_actions(problem).sum())
+    steps = torch.arange(frames).repeat_interleave(answered)
+    shots = SHOTS_OF_ACTION[:answered].repeat(frames)
     at_once = max(1, MOST_PIXELS // (problem.bank.height * problem.bank.width))
     measured = [
         measure_frames(problem, take(drive, torch.zeros_like(step)), step, taken)
         for step, taken in zip(steps.split(at_once), shots.split(at_once), strict=True)
     ]
-    return mapped(lambda rows: rows.unflatten(0, (frames, ACTIONS)), concatenate(measured))
+    table = mapped(lambda rows: rows.unflatten(0, (frames, answered)), concatenate(measured))
+    return mapped(lambda values: _filled(values, ACTIONS - answered), table)
+
+
+def _filled(values: Tensor, count: int) -> Tensor:
+    """Values [T, A, ...] with NaN for `count` more actions."""
+    unknown = values[:, :1].expand(-1, count, *values.shape[2:])
+    return torch.cat((values, torch.full_like(unknown, torch.nan)), dim=1)

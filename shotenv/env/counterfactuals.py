@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from shotenv.decision import Measure, Problem, State, step
+from shotenv.decision import Measure, Problem, State, answered_actions, step
 from shotenv.env.arguments import ACTIONS
 from shotenv.env.info import Columns, info_columns
 
@@ -33,15 +33,23 @@ def outcome_columns(
     """What each action would bring in the frames at `before` [B]: arrays [B, 3, ...].
 
     Exact counterfactuals, not estimates: the transition is played with each of them, with the
-    noise of the frame itself, and the one that is then chosen brings just this.
+    noise of the frame itself, and the one that is then chosen brings just this. Of actions that
+    recordings do not answer nothing is known: NaN, or 0 where there is none.
     """
-    tried = []
-    for action in range(ACTIONS):
+    tried: list[Columns] = []
+    for action, answered in enumerate(answered_actions(problem).tolist()):
+        if not answered:
+            tried.append({name: _unknown(values) for name, values in tried[0].items()})
+            continue
         actions = torch.full_like(before.step, action)
         after, outcome = step(problem, before, actions, measure=measure)
         columns = info_columns(problem, family_codes, before, after, outcome)
         tried.append({name: columns[name] for name in TOLD} | {"reward": outcome.reward.numpy()})
     return {name: np.stack([one[name] for one in tried], axis=1) for name in tried[0]}
+
+
+def _unknown(values: np.ndarray) -> np.ndarray:
+    return np.full_like(values, np.nan if values.dtype.kind == "f" else 0)
 
 
 def no_outcomes(columns: Columns) -> Columns:

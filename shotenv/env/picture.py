@@ -111,13 +111,14 @@ def frame_panels(problem: Problem, state: State, shots: int) -> dict[str, Image.
     frame = state.drive.frame(state.step)
     full_scale = full_scale_lsb(problem.config.sensor.adc_bits)
     gray = problem.bank.gray(frame)[0].to(torch.float32) / full_scale
-    truth_m = problem.bank.exposure(frame).distance_m[0]
+    acquisition = acquired_again(problem, state, Shots(shots)) if shots else None
+    # Where it is measured itself it comes with the acquisition.
+    truth_m = (acquisition.truth_m if acquisition else problem.bank.distance_m(frame))[0]
     # What is beyond the scored range stays black, like the sky; its error would not count.
     near_m = torch.where(truth_m <= range_m(problem), truth_m, torch.nan)
     nothing = torch.full_like(truth_m, torch.nan)
     wrapped_m, corrected_m, error_m = nothing, nothing, nothing
-    if shots:
-        acquisition = acquired_again(problem, state, Shots(shots))
+    if acquisition:
         depth = acquisition.depth
         wrapped_m = depth.wrapped_m[0]
         corrected_m = torch.where(depth.valid[0], depth.distance_m[0], torch.nan)

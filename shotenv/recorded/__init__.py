@@ -1,4 +1,4 @@
-"""Recordings of cameras become banks, and simulated drives recordings.
+"""Cameras' recordings as banks, and simulated drives as recordings.
 
 recordings_file.py  what `recordings.yaml` tells beside the recordings
 frame_tables.py     what is told of each frame in files of their own: truth, speeds, offsets

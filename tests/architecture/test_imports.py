@@ -152,6 +152,7 @@ room(
     "shotenv.config",
     "agents.report",
 )
+room("agents.report.recordings", *PLAYING, "agents.evaluation", "agents.report")
 room("agents.deploy", *SIGNAL, "agents.policies")
 room("agents", "agents.policies", "agents.evaluation", "agents.training")
 room(

@@ -157,27 +157,29 @@ container: arrays
 layout: {axes: FPHW}
 words: {bits: 12, signed: true}
 samples: {phase_deg: [0, 90, 180, 270]}
-frequencies_hz: [24.0e+6, 10.0e+6]
 passive: {where: recording, highest: 4095}
 lens: {horizontal_fov_deg: 60}
 """
 """A camera that stores what is recorded of a drive, in plain arrays."""
 
 
-def write_folder(folder: Path, recorded: Sequence[Recorded], **common) -> Path:
+def write_folder(
+    folder: Path, recorded: Sequence[Recorded], *, samples: int = 8, truth: bool = True, **common
+) -> Path:
     """Recordings as `bank import` takes them, and all that is told beside them: `folder`."""
+    hertz = "[24.0e+6, 10.0e+6]" if samples == 8 else "[24.0e+6]"
     folder.mkdir(parents=True)
     (folder / "camera").mkdir()
-    (folder / "camera" / "bench.yaml").write_text(CAMERA)
+    (folder / "camera" / "bench.yaml").write_text(f"{CAMERA}frequencies_hz: {hertz}\n")
     rows = []
     for number, one in enumerate(recorded):
         name, facts = f"drive_{number}", one.facts
         eight = one.raws[Shots.EIGHT]
         np.savez(
             folder / f"{name}.npz",
-            dcs=eight.dcs_lsb.numpy().astype(np.int16),
+            dcs=eight.dcs_lsb[:, :samples].numpy().astype(np.int16),
             gray=one.gray.numpy(),
-            saturated=flags_of(one.raws),
+            saturated=flags_of(one.raws)[:, :samples],
             timestamp_s=100.0 + 0.1 * np.arange(len(one.gray)),
         )
         np.save(folder / f"{name}_truth.npy", one.truth_m.numpy())
@@ -190,7 +192,7 @@ def write_folder(folder: Path, recorded: Sequence[Recorded], **common) -> Path:
         rows.append(
             {
                 "file": f"{name}.npz",
-                "truth": f"{name}_truth.npy",
+                **({"truth": f"{name}_truth.npy"} if truth else {}),
                 "ego": f"{name}_ego.csv",
                 "offset": f"{name}_offset.npy",
                 "family": facts.family,

@@ -1,8 +1,11 @@
 import numpy as np
 import pytest
+import torch
 
 from agents.policies.fixed import CyclePolicy, FixedPolicy, RandomPolicy
+from agents.policies.learned import NetworkPolicy
 from agents.policies.rules import SnrThresholdPolicy
+from agents.policies.scheduler_files import Provenance
 
 NAMES = ("gray_mean", "signal_to_noise", "time_left")
 ONE, BATCH = np.zeros(3, np.float32), np.zeros((5, 3), np.float32)
@@ -58,3 +61,18 @@ def test_wrong_arguments_are_named():
         CyclePolicy(1)
     with pytest.raises(ValueError, match="no 'signal_to_noise'"):
         SnrThresholdPolicy(("gray_mean",), 0.0, 8, 2)
+
+
+def test_among_some_actions_a_policy_takes_the_next_lower_and_a_network_its_next_best():
+    allowed = np.array([True, True, False])
+    cycle = CyclePolicy(2, shots=8, otherwise=2)
+    assert [cycle.act_among(np.zeros(3), None, allowed) for _ in range(3)] == [1, 0, 1]
+    assert FixedPolicy(8).act_among(np.zeros((2, 3)), None, allowed).tolist() == [1, 1]
+    network = torch.nn.Sequential(torch.nn.Linear(1, 3))
+    network[0].weight.data.zero_()
+    network[0].bias.data = torch.tensor([2.0, 1.0, 3.0])
+    told = Provenance(algorithm="none", feature_names=("power",))
+    policy = NetworkPolicy(network, told)
+    seen = np.zeros((2, 1), np.float32)
+    assert policy.act(seen).tolist() == [2, 2]
+    assert policy.act_among(seen, None, allowed).tolist() == [0, 0]
