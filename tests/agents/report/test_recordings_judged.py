@@ -7,7 +7,7 @@ import json
 
 import numpy as np
 import pytest
-from agents.cli.camera_commands import read_camera
+from agents.cli.cameras.camera_commands import read_camera
 from word_banks import record, write_folder
 
 from agents.cli.entry import main
