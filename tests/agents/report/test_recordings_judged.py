@@ -7,9 +7,9 @@ import json
 
 import numpy as np
 import pytest
-from agents.cli.cameras.camera_commands import read_camera
 from word_banks import record, write_folder
 
+from agents.cli.cameras.camera_commands import read_camera
 from agents.cli.entry import main
 from agents.optimum.tabulation import tabulate
 from agents.policies.learned import NetworkPolicy

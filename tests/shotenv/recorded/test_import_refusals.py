@@ -7,8 +7,8 @@ import shutil
 import numpy as np
 import pytest
 import yaml
-from agents.cli.cameras.camera_commands import read_camera
 
+from agents.cli.cameras.camera_commands import read_camera
 from shotenv.config.reader import find_config
 from shotenv.recorded.bank_import import import_bank
 
