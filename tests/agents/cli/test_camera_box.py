@@ -120,7 +120,7 @@ def test_from_the_box_to_a_report(made_up_camera, run, scheduler, tiny_unwrapper
     assert ("always_8" in results["policies"]) == eight
     if eight:
         # Two frequencies unwrap each other; the network of the others has learned nothing.
-        assert results["policies"]["always_8"]["depth_mae_m"]["mean"] < 0.1
+        assert results["policies"]["always_8"]["depth_mae_m"]["mean"] < 0.2
     four = four_of_first_frame(bank / "env.yaml", tiny_unwrapper)
     range_m = four.depth.unambiguous_m
     off_m = (four.depth.distance_m - four.truth_m + range_m / 2) % range_m - range_m / 2
