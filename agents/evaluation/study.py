@@ -87,9 +87,9 @@ def price_of(config: EnvConfig) -> float:
     return low if low == high else float(np.sqrt(low * high))  # rounding would make it another
 
 
-def without_tuning(env: EnvConfig) -> str | None:
-    """Why no rule can be tuned, where that is so: a sentence, or None."""
-    bank = open_problem(env.model_copy(update={"split": "all"})).bank
+def without_tuning(problem: Problem) -> str | None:
+    """Why no rule can be tuned on the problem's bank, where that is so: a sentence, or None."""
+    bank = problem.bank
     if any(clip.split == "validation" for clip in bank.clips):
         return None
     return f"tuned rules: bank {bank.name} has no validation clips to tune them on"
@@ -194,7 +194,8 @@ def evaluate_scheduler(
     if budget_j is not None:
         check_budget(budget_j, plays)
     # Simulated banks have all splits; recordings may not.
-    untuned = without_tuning(config.env)
+    problem = open_problem(config.env.model_copy(update={"split": study.split}))
+    untuned = without_tuning(problem)
     tuned = {} if untuned else tune_families(config)
     rules = {name: found[price_of(config.env)].policy for name, found in tuned.items()}
     policies = {
@@ -205,7 +206,6 @@ def evaluate_scheduler(
     }
     played = play_all(policies, envs, study)
     fronts, own_drives = play_fronts(scheduler, tuned, envs, config)
-    problem = open_problem(config.env.model_copy(update={"split": study.split}))
     optimum, cool_eight_m = table_fronts(problem, study)
 
     results = summary(played, study, scheduler=SCHEDULER, drive_s=drive_s(config.env))

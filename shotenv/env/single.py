@@ -162,7 +162,7 @@ class ShotScheduleEnv(gymnasium.Env[Any, np.int64]):
         Raises
         ------
         ValueError
-            The action is not 0, 1 or 2.
+            The action is not 0, 1 or 2, or asks for samples that were not recorded.
         ResetNeeded
             No drive has been started, or it is over.
         """
@@ -202,7 +202,10 @@ class ShotScheduleEnv(gymnasium.Env[Any, np.int64]):
         return paint_drive(self.problem, self._trace) if self.render_mode == "rgb_array" else None
 
     def action_masks(self) -> np.ndarray:
-        """Which actions the laser's heat allows now, bool [3]: others would trip it."""
+        """Which actions can be taken now, bool [3]: others would trip the laser.
+
+        Of recordings those alone that they answer.
+        """
         if self.state is None:
             raise gymnasium.error.ResetNeeded("no drive is under way; call reset() first")
         return allowed_actions(self.problem, self.state)[0].numpy()

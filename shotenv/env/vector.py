@@ -167,7 +167,7 @@ class ShotScheduleVectorEnv(VectorEnv):
         Raises
         ------
         ValueError
-            The actions are not N whole numbers 0, 1 or 2.
+            The actions are not N whole numbers 0, 1 or 2, or ask for what was not recorded.
         ResetNeeded
             No drives have been started, or one is over and nothing resets it.
         """
@@ -202,7 +202,7 @@ class ShotScheduleVectorEnv(VectorEnv):
         return self._observations(), rewards, none, truncated, infos
 
     def action_masks(self) -> np.ndarray:
-        """Which actions the heat of each drive's laser allows now, bool [N, 3]."""
+        """Which actions can be taken now, bool [N, 3]; see `ShotScheduleEnv.action_masks`."""
         return allowed_actions(self.problem, self._under_way()).numpy()
 
     def render(self) -> tuple[np.ndarray, ...] | None:

@@ -126,17 +126,18 @@ def level_of(wanted: TruthLevel | None, rows: Sequence[RecordedFile], samples: i
     Raises
     ------
     ValueError
-        References are wanted where none are named, or the depth of eight samples of four.
+        References are wanted where some are not named, or the depth of eight samples of four.
     """
-    named = any(row.truth is not None for row in rows)
-    if wanted is None:
-        own: TruthLevel = "own" if samples == 8 else "none"
-        return "external" if named else own
-    if wanted == "external" and not named:
-        raise ValueError(
-            f"truth is 'external', but {RECORDINGS_FILE} names no file of truth; expected one, or "
-            "own or none"
-        )
+    missing = [row.file for row in rows if row.truth is None]
+    if wanted is None and len(missing) == len(rows):
+        return "own" if samples == 8 else "none"
+    if wanted in (None, "external"):
+        if missing:
+            raise ValueError(
+                f"truth is 'external', but {RECORDINGS_FILE} names none of {missing[0]}; expected "
+                "one of every recording, or own or none"
+            )
+        return "external"
     if wanted == "own" and samples != 8:
         raise ValueError(
             f"truth is 'own', but recordings have {samples} samples; expected 8, whose two "

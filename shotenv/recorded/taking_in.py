@@ -186,18 +186,14 @@ def take_in(
 def _tables_of(
     row: RecordedFile, folder: Path, shape: tuple[int, int, int], external: bool
 ) -> dict[str, np.ndarray]:
-    """Offset, and with external truth the reference: NaN where the recording has none."""
+    """Offset, and with external truth the reference."""
     size = shape[1:]
     no_offset = np.zeros(size, np.float32)
     found = {
         "offset_lsb": no_offset if row.offset is None else read_offset(folder / row.offset, size)
     }
-    if external:
-        found["distance_m"] = (
-            np.full(shape, np.nan, np.float32)
-            if row.truth is None
-            else read_truth(folder / row.truth, shape)
-        )
+    if external and row.truth is not None:  # There is one of each recording.
+        found["distance_m"] = read_truth(folder / row.truth, shape)
     return found
 
 

@@ -16,8 +16,8 @@ TRUTHS = {
     "frequencies agree. 8 DCS are not scored against themselves: their error term is what their "
     "noise lets expect, which also adds to that of fewer samples, and depth errors are those of "
     "frames with fewer.",
-    "none": "There is no reference and no eight samples that could be one: no error is known. Only "
-    "energy, duty and heat count, and the fewest samples always return the most.",
+    "none": "There is no reference, and no error is known. Only energy, duty and heat count, and "
+    "the fewest samples always return the most.",
 }
 
 

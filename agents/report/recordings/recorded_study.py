@@ -88,14 +88,18 @@ def evaluate_recordings(
         for shots in Shots
         if shots not in answers
     ]
-    policies: dict[str, Policy] = {SCHEDULER: scheduler}
-    if (why := without_tuning(config.env)) is not None:
+    rules: dict[str, Policy] = {}
+    if (why := without_tuning(problem)) is not None:
         left_out.append(why)
     else:
         tuned = tune_families(config)
-        policies |= {name: found[price_of(config.env)].policy for name, found in tuned.items()}
-    policies["random"] = RandomPolicy(study.seed)
-    policies |= {name: FIXED_POLICIES[name] for name in map(_fixed_name, answers)}
+        rules = {name: found[price_of(config.env)].policy for name, found in tuned.items()}
+    policies: dict[str, Policy] = {
+        SCHEDULER: scheduler,
+        **rules,
+        "random": RandomPolicy(study.seed),
+        **{name: FIXED_POLICIES[name] for name in (f"always_{shots:d}" for shots in answers)},
+    }
     envs = make_envs(config.env, study.split, study.drives, "Disabled")
     seeds = drive_seeds(study, study.drives)
     played = {}
@@ -116,7 +120,10 @@ def evaluate_recordings(
         "left_out": left_out,
         "scheduler": SCHEDULER,
         "policies": {
-            name: {**measures_of(one, study), "rule": _rule(policies.get(name))}
+            name: {
+                **measures_of(one, study),
+                "rule": str(rules[name]) if name in rules else None,
+            }
             for name, one in played.items()
         },
         "drives": len(seeds),
@@ -151,13 +158,3 @@ def mean_told(
     if np.count_nonzero(there) < LEAST_CLIPS:
         return {"mean": float(total.sum() / count.sum()), "low": None, "high": None}
     return study_interval(ratio, study, total[there], count[there]).named("mean")
-
-
-def _fixed_name(shots: Shots) -> str:
-    return f"always_{shots:d}"
-
-
-def _rule(policy: Policy | None) -> str | None:
-    """A rule in words; of what is no rule nothing."""
-    known = policy is not None and type(policy).__str__ is not object.__str__
-    return str(policy) if known else None

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from shotenv.bank import Bank, BankError, Clip, require_full
+from shotenv.bank import Bank, BankError, Clip, RecordedBank, require_full
 from shotenv.config import SensorConfig
 from shotenv.sensor import full_scale_lsb
 from unwrap.pictures import (
@@ -33,22 +33,25 @@ from unwrap.pictures import (
     paint,
     text,
 )
-from unwrap.signal import SAMPLES_PER_FREQUENCY, decode, distance_m, unambiguous_range_m
+from unwrap.signal import SAMPLES_PER_FREQUENCY, Shots, decode, distance_m, unambiguous_range_m
 
 CLIPS_PER_FAMILY = 3
 AMPLITUDE_DECADES = (-5.0, 0.0)
 """Of log10 of the amplitude: a dark wall at 25 m to a bright one at hand."""
+RECORDED_DECADES = (0.0, 3.5)
+"""The same of samples in LSB, up to those that overflow 12 bits."""
 
 
 def contact_sheet(bank: Bank, *, clips: int = CLIPS_PER_FAMILY) -> Image.Image:
     """Middle frames of some clips of each family, as the renderer left them: without sensor noise.
 
-    Each shows the gray image, the true distance, and wrapped distance and amplitude at f1.
+    Of recordings their first four samples, and the reference where there is one. Each shows the
+    gray image, the true distance, and wrapped distance and amplitude at f1.
 
     Parameters
     ----------
     bank : Bank
-        A rendered bank.
+        A rendered bank, or one of recordings.
     clips : int
         Of each family, at least 1; one from each of its splits before a second from any.
 
@@ -58,9 +61,7 @@ def contact_sheet(bank: Bank, *, clips: int = CLIPS_PER_FAMILY) -> Image.Image:
         An imported bank, whose frequencies nothing tells; a thinned one, which has no pictures.
     """
     require_full(bank, "a contact sheet")
-    if bank.config is None:
-        raise BankError(f"bank {bank.folder} was imported: nothing tells its frequencies")
-    maps, scale = color_maps(bank.config.sensor), max(1, bank.width // NARROWEST_TILE_PX)
+    maps, scale = color_maps(bank), max(1, bank.width // NARROWEST_TILE_PX)
     title = [
         text(
             f"{bank.name}: {len(bank)} frames of {bank.width} x {bank.height} pixels in "
@@ -77,14 +78,34 @@ def contact_sheet(bank: Bank, *, clips: int = CLIPS_PER_FAMILY) -> Image.Image:
     return framed(column([line(title), *rows, legend], gap=2 * GAP_PX * scale))
 
 
-def color_maps(sensor: SensorConfig) -> dict[str, ColorMap]:
+def sensor_of(bank: Bank) -> SensorConfig:
+    """The sensor that a bank was rendered for, or that its recordings are of.
+
+    Raises
+    ------
+    BankError
+        It does not tell.
+    """
+    if isinstance(bank, RecordedBank):
+        return bank.manifest.sensor
+    if bank.config is None:
+        raise BankError(f"bank {bank.folder} was imported: nothing tells its frequencies")
+    return bank.config.sensor
+
+
+def color_maps(bank: Bank) -> dict[str, ColorMap]:
     """How each of the pictures of a clip is coloured."""
+    sensor = sensor_of(bank)
+    amplitude = ColorMap(*AMPLITUDE_DECADES, "log10, W/m2/sr per W", ERROR)
+    if bank.is_recorded:
+        amplitude = ColorMap(*RECORDED_DECADES, "log10, LSB", ERROR)
     unambiguous_m = unambiguous_range_m(sensor.f1_hz)
+    told = "m, of 4 samples" if bank.is_recorded else "m, noise-free"
     return {
         "gray image": ColorMap(0.0, 1.0, "share of full scale, gamma 0.5", GRAY),
         "distance": ColorMap(0.0, sensor.max_range_m, "m, clipped above", VIRIDIS),
-        "wrapped distance": ColorMap(0.0, unambiguous_m, "m, noise-free", CYCLIC),
-        "amplitude": ColorMap(*AMPLITUDE_DECADES, "log10, W/m2/sr per W", ERROR),
+        "wrapped distance": ColorMap(0.0, unambiguous_m, told, CYCLIC),
+        "amplitude": amplitude,
     }
 
 
@@ -98,15 +119,20 @@ def clips_by_family(bank: Bank) -> dict[str, list[Clip]]:
 
 def maps_of(bank: Bank, index: int) -> dict[str, np.ndarray]:
     """Pictures of frame `index` before they are coloured, each float [H, W]; see `color_maps`."""
-    frame, sensor = bank.frame(index), bank.config.sensor
-    # Noise-free light in place of samples: phase and amplitude are decoded from it just so.
-    first = decode(frame.exposure.correlation[0, :SAMPLES_PER_FREQUENCY])
+    sensor, one = sensor_of(bank), torch.tensor([index])
+    if isinstance(bank, RecordedBank):
+        samples, truth_m = bank.words(one, Shots.FOUR).dcs_lsb[0], bank.distance_m(one)[0]
+    else:
+        # Noise-free light in place of samples: phase and amplitude are decoded from it just so.
+        light = bank.exposure(one)
+        samples, truth_m = light.correlation[0, :SAMPLES_PER_FREQUENCY], light.distance_m[0]
+    first = decode(samples)
     lit = first.amplitude > 0
     wrapped_m = torch.where(lit, distance_m(first.phase_rad, sensor.f1_hz), torch.nan)
     return {
         # Dark scenes would be black without the gamma, as in `env.picture`.
-        "gray image": (frame.gray.numpy() / full_scale_lsb(sensor.adc_bits)) ** 0.5,
-        "distance": frame.exposure.distance_m[0].numpy(),
+        "gray image": (bank.gray(one)[0].numpy() / full_scale_lsb(sensor.adc_bits)) ** 0.5,
+        "distance": truth_m.numpy(),
         "wrapped distance": wrapped_m.numpy(),
         "amplitude": torch.where(lit, first.amplitude.log10(), torch.nan).numpy(),
     }

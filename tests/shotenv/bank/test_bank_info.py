@@ -105,7 +105,7 @@ def test_the_true_distance_is_on_the_sheet_once_in_its_colours(tiny_bank):
     bank = open_bank(tiny_bank)
     pixels = np.asarray(contact_sheet(bank, clips=1))
     distance_m = maps_of(bank, bank.clips[0].frames // 2)["distance"]
-    colors = color_maps(bank.config.sensor)["distance"]
+    colors = color_maps(bank)["distance"]
     near = np.clip(distance_m / colors.high * 254, 0, 254).round()
     expected = colors.palette[np.where(np.isfinite(distance_m), near, 255).astype(int)]
     enlarged = np.kron(expected, np.ones((5, 5, 1), int))

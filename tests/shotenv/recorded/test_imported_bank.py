@@ -9,6 +9,7 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 from agents.cli.entry import main
 from shotenv.bank.layout import BankError
@@ -95,7 +96,10 @@ def test_the_commands_tell_what_it_is_and_check_it(bank, folder, tmp_path, capsy
     about = json.loads(told.read_text())
     assert about["recorded"]["truth"] == "own" and about["recorded"]["camera"] == "bench"
     assert about["splits"] == {"test": {"street": 2 * FRAMES}}
-    assert main(["bank", "info", str(out)]) == 0
+    sheet = tmp_path / "sheet.png"
+    assert main(["bank", "info", str(out), "--sheet", str(sheet)]) == 0
+    with Image.open(sheet) as image:
+        assert image.size[0] > 100
     assert "bench at 10 Hz" in capsys.readouterr().out
     assert main(["bank", "verify", str(out)]) == 0
     # The same recordings with another truth are another bank of the same words.
