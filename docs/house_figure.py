@@ -29,7 +29,7 @@ Points = tuple[tuple[float, float], ...]
 
 LEFT, RIGHT, LOW, HIGH = -40, 1036, 26, 996
 """The drawing's edges; one unit is a little less than a pixel of the README."""
-DOTS_PER_UNIT = 1.6
+DOTS_PER_UNIT = 1.5
 CORRIDOR, ACTION, TEXT = "#a3195b", "#5f6975", "#1f2933"
 
 
