@@ -1,4 +1,4 @@
-"""Results as charts and pages."""
+"""Charts and pages."""
 
 import lazy_loader
 
