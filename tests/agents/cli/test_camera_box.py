@@ -125,5 +125,7 @@ def test_from_the_box_to_a_report(made_up_camera, run, scheduler, tiny_unwrapper
     range_m = four.depth.unambiguous_m
     off_m = (four.depth.distance_m - four.truth_m + range_m / 2) % range_m - range_m / 2
     good = four.depth.valid & four.scored
-    assert good.float().mean() > 0.8 and off_m[good].abs().median() < 0.03
+    # The corridor's end is beyond what some cameras' frequencies unwrap, and is not scored.
+    assert four.scored.float().mean() > 0.5
+    assert good.sum() > 0.8 * four.scored.sum() and off_m[good].abs().median() < 0.03
     assert (tmp_path / "report" / "report.html").is_file()
