@@ -44,6 +44,7 @@ from unwrap.signal import (
     harmonic_weights,
     sample_times_s,
 )
+from unwrap.support import progress
 
 LASER_POWER_W, INTEGRATION_S = 5.0, 500e-6
 CENTI_CELSIUS = 3500
@@ -170,30 +171,45 @@ def light_at(sensor: SensorConfig, directions: np.ndarray, time_s: float) -> Exp
     )
 
 
+def served_frame(
+    sensor: SensorConfig,
+    directions: np.ndarray,
+    per_light: Sensitivity,
+    offsets: OffsetPattern,
+    number: int,
+    period_s: float,
+) -> ServedFrame:
+    """What the camera delivers of frame `number`, if it is asked for."""
+    size = directions.shape[1:]
+    exposure = light_at(sensor, directions, number * period_s)
+    *normals, for_gray = islice(noise_samples([0], [number], *size), 9)
+    gray, exposure_s = capture_gray(exposure.ambient, sensor, noise=for_gray[:, 0])
+    taken = acquire_prefixes(
+        incident_light(exposure, per_light),
+        sensor,
+        shots=Shots.EIGHT,
+        noise=normals,
+        offsets=offsets,
+    )
+    full = np.zeros((8, *size), bool)
+    for shots, raw in taken.items():
+        full[shots - 1] = raw.saturated[0].numpy()
+    words = wire_words(taken[Shots.EIGHT].dcs_lsb[0].numpy(), full)
+    exposure_us = round(1e6 * float(exposure_s[0]))
+    return ServedFrame(gray[0].numpy().astype(np.uint16), exposure_us, words)
+
+
 def street(
     sensor: SensorConfig, frames: int, size: tuple[int, int], period_s: float
 ) -> tuple[list[ServedFrame], OffsetPattern]:
     """What the camera will have in store, and the fixed pattern of its imager."""
     directions, per_light = rays(size), camera_sensitivity(sensor)
     offsets = draw_offsets(sensor, *size, generator=stream(Purpose.OFFSETS, 0))
-    stored = []
-    for number in range(frames):
-        exposure = light_at(sensor, directions, number * period_s)
-        *normals, for_gray = islice(noise_samples([0], [number], *size), 9)
-        gray, exposure_s = capture_gray(exposure.ambient, sensor, noise=for_gray[:, 0])
-        taken = acquire_prefixes(
-            incident_light(exposure, per_light),
-            sensor,
-            shots=Shots.EIGHT,
-            noise=normals,
-            offsets=offsets,
-        )
-        full = np.zeros((8, *size), bool)
-        for shots, raw in taken.items():
-            full[shots - 1] = raw.saturated[0].numpy()
-        words = wire_words(taken[Shots.EIGHT].dcs_lsb[0].numpy(), full)
-        exposure_us = round(1e6 * float(exposure_s[0]))
-        stored.append(ServedFrame(gray[0].numpy().astype(np.uint16), exposure_us, words))
+    with progress(frames, "what the camera sees", "frame") as bar:
+        stored = []
+        for number in range(frames):
+            stored.append(served_frame(sensor, directions, per_light, offsets, number, period_s))
+            bar.update()
     return stored, offsets
 
 
