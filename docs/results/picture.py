@@ -19,6 +19,8 @@ SHOWN: Final = {
     "optimum": "#1e293b",
 }
 """Rows of the picture and their colours, those of the report's charts where it has them."""
+FEW: Final = 3
+"""Fewest rows, with those of blind choices and of the optimum, that need no others beside them."""
 
 
 def paint(tables: dict[str, Any], path: Path) -> None:
@@ -29,22 +31,25 @@ def paint(tables: dict[str, Any], path: Path) -> None:
     from matplotlib import pyplot
 
     figure, axes = pyplot.subplots(
-        1, len(tables), figsize=(max(3.1 * len(tables), 7.0), 3.8), squeeze=False
+        1, len(tables), figsize=(max(4.4 * len(tables), 7.0), 4.6), squeeze=False
     )
     for axis, (preset, table) in zip(axes[0], tables.items(), strict=True):
-        # Of another study there may be none of them: its learners, then.
         names = [name for name in SHOWN if name in table["fronts"]]
-        names += [name for name in rows_of(table)[:3] if name not in names]
+        # Of another table there may be few of them: its best, then.
+        if len(names) <= FEW:
+            names += [name for name in rows_of(table)[:3] if name not in names]
         for number, name in enumerate(names):
             color = SHOWN.get(name, f"C{number}")
             for seed, points in enumerate(table["fronts"][name]):
                 energy = [100 * point["laser_energy_share"] for point in points]
                 error_m = [point["depth_mae_m"] for point in points]
-                axis.plot(energy, error_m, ".", color=color, markersize=3, alpha=0.5)
+                axis.plot(energy, error_m, ".", color=color, markersize=2, alpha=0.4)
                 best = undominated(energy, error_m)
                 style = {"blind": ":", "optimum": "--"}.get(name, "-")
                 label = name.replace("_", " ") if not seed else None
-                axis.plot(*best, style, color=color, linewidth=1.2, alpha=0.8, label=label)
+                # One training strong, the others thin: they lie close together.
+                width, alpha = (0.5, 0.4) if seed else (1.5, 0.9)
+                axis.plot(*best, style, color=color, linewidth=width, alpha=alpha, label=label)
         axis.set_title(preset.replace("_", " "), fontsize=10)
         axis.set_xlabel("laser energy, % of 8 DCS", fontsize=9)
         axis.set_ylim(bottom=0)
