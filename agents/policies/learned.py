@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +11,7 @@ import torch
 from torch import nn
 
 from agents.policies.foreign_zips import network_of_zip
-from agents.policies.policy import Action, Observation, Policy, single
+from agents.policies.policy import Observation, ScoringPolicy
 from agents.policies.recurrent import RecurrentPolicy
 from agents.policies.scheduler_files import (
     DESCRIPTION,
@@ -40,7 +39,7 @@ if TYPE_CHECKING:
     from stable_baselines3.dqn.policies import QNetwork
 
 
-class NetworkPolicy(Policy):
+class NetworkPolicy(ScoringPolicy):
     """A feed-forward network that scores each action; the highest score wins.
 
     Saved as a folder of `policy.safetensors` and `agent.json`; nothing is ever unpickled, and
@@ -64,8 +63,6 @@ class NetworkPolicy(Policy):
     >>> policy.scores(np.zeros((2, 1), np.float32)).shape
     (2, 3)
     """
-
-    reads_price = True  # among its features
 
     def __init__(self, network: nn.Sequential, provenance: Provenance) -> None:
         self.activation = activation_of(network)
@@ -107,16 +104,6 @@ class NetworkPolicy(Policy):
         with torch.inference_mode():
             found = self._runs(features.reshape(-1, features.shape[-1]))
         return found.reshape(*features.shape[:-1], -1).numpy()
-
-    def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
-        """The action of the highest score, the first of equal ones."""
-        return single(self.scores(observation).argmax(axis=-1))
-
-    def act_among(
-        self, observation: Observation, info: Mapping[str, Any] | None, allowed: np.ndarray
-    ) -> Action:
-        """The allowed action of the highest score."""
-        return single(np.where(allowed, self.scores(observation), -np.inf).argmax(axis=-1))
 
     def save(self, folder: Path) -> None:
         """Write `policy.safetensors`, then `agent.json`, each atomically."""

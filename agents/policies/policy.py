@@ -55,6 +55,26 @@ class Policy(ABC):
         """Forget everything: the next `act` is the first of new drives."""
 
 
+class ScoringPolicy(Policy):
+    """Takes the action that it scores highest, the first of equal ones."""
+
+    reads_price = True  # among its features
+
+    @abstractmethod
+    def scores(self, observation: Observation) -> np.ndarray:
+        """Score of each action, float32 [..., 3], for features [..., D]."""
+
+    def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
+        """The action of the highest score."""
+        return single(self.scores(observation).argmax(axis=-1))
+
+    def act_among(
+        self, observation: Observation, info: Mapping[str, Any] | None, allowed: np.ndarray
+    ) -> Action:
+        """The allowed action of the highest score."""
+        return single(np.where(allowed, self.scores(observation), -np.inf).argmax(axis=-1))
+
+
 def checked_shots(shots: int) -> Shots:
     """`shots` as `Shots`.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from agents.policies.policy import Action, Observation, Policy, single
+from agents.policies.policy import Observation, ScoringPolicy
 from agents.policies.scheduler_files import (
     DESCRIPTION,
     Description,
@@ -46,7 +45,7 @@ class RecurrentNetwork(nn.Module):
         return self.network(told[0]), after
 
 
-class RecurrentPolicy(Policy):
+class RecurrentPolicy(ScoringPolicy):
     """An LSTM that reads the features frame after frame, and a network of its output that scores
     each action; the highest score wins.
 
@@ -75,8 +74,6 @@ class RecurrentPolicy(Policy):
     >>> (first == second).all(), (first == policy.scores(np.ones((2, 1)))).all()
     (np.False_, np.True_)
     """
-
-    reads_price = True  # among its features
 
     def __init__(self, memory: nn.LSTM, network: nn.Sequential, provenance: Provenance) -> None:
         form = memory.num_layers, memory.bias, memory.bidirectional, memory.proj_size
@@ -124,16 +121,6 @@ class RecurrentPolicy(Policy):
         with torch.inference_mode():
             scores, self._remembered = self.network(drives, self._remembered)
         return scores.reshape(*features.shape[:-1], -1).numpy()
-
-    def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
-        """The action of the highest score, the first of equal ones; the frame is remembered."""
-        return single(self.scores(observation).argmax(axis=-1))
-
-    def act_among(
-        self, observation: Observation, info: Mapping[str, Any] | None, allowed: np.ndarray
-    ) -> Action:
-        """The allowed action of the highest score."""
-        return single(np.where(allowed, self.scores(observation), -np.inf).argmax(axis=-1))
 
     def reset(self) -> None:
         """Forget the drives: hidden and cell states begin at 0."""
