@@ -115,6 +115,16 @@ def test_without_rules_and_optimum_the_rest_is_told():
     )
 
 
+def test_more_than_the_whole_gap_is_explained():
+    def told(closed):
+        results = made_up_results()
+        results["answer"]["measures"]["look_and_hold"]["gap_closed"]["mean"] = closed
+        page = render_page(results, made_up_timeline(), made_up_choices(), made_up_strip())
+        return "More than 100 % of a gap" in page
+
+    assert told(1.5) and not told(1.0)
+
+
 def test_prices_that_would_cover_each_other_are_left_out():
     rows = [
         {"price": price, "laser_energy_share": share}
