@@ -14,6 +14,7 @@ from typing import Annotated, Any, Final
 from pydantic import Field, StringConstraints, ValidationError, field_validator
 from torch import nn
 
+from agents.config import MOST_HIDDEN, WIDEST
 from agents.policies.score_networks import Activation
 from shotenv.config import one_sentence
 from unwrap.support import (
@@ -31,7 +32,7 @@ WEIGHTS: Final = "policy.safetensors"
 DESCRIPTION: Final = "agent.json"
 PACKAGES: Final = ("shotenv", "torch", "stable-baselines3", "sb3-contrib")
 # Assumed: a damaged or hostile description must not make a network that fills the memory.
-WIDEST, DEEPEST = 1024, 16
+DEEPEST = MOST_HIDDEN + 2
 MOST_DESCRIPTION_BYTES, MOST_WEIGHTS_BYTES = 1 << 20, 1 << 27
 """Of the two files: a description has some 4 kB, the largest network above 70 MB."""
 # They become identifiers of an exported scheduler's C file, and lines of its comments.
