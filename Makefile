@@ -1,10 +1,10 @@
-# make setup | demo | test | lint | bench. Everything is installed into .venv; PYTHON picks the interpreter.
+# make setup | demo | test | lint | bench | reliability. Everything is installed into .venv; PYTHON picks the interpreter.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: setup demo test lint bench clean
+.PHONY: setup demo test lint bench reliability clean
 
 setup: $(STAMP)
 	@sh tools/llvm.sh
@@ -28,6 +28,9 @@ lint: setup
 
 bench: setup
 	$(BIN)/python -m benchmarks
+
+reliability: setup
+	$(BIN)/python -m reliability
 
 clean:
 	rm -rf $(VENV) build dist runs

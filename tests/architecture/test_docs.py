@@ -32,7 +32,7 @@ TOP = {path.name for path in ROOT.iterdir() if not path.name.startswith(".")}
 HOUSES = ("unwrap", "shotenv", "agents")
 SCRIPTS = sorted(
     path.relative_to(ROOT).as_posix()
-    for folder in ("docs", "examples", "benchmarks")
+    for folder in ("docs", "examples", "benchmarks", "reliability")
     for path in (ROOT / folder).rglob("*.py")
 )
 PHYSICS = "docs/physics.md"

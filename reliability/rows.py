@@ -1,0 +1,99 @@
+"""What a measurement reports, and how it is kept: a JSON file each, with where it was measured."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+KEPT = ROOT / "docs" / "reliability"
+"""Folder of the files of measurements."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the page.
+
+    Parameters
+    ----------
+    promise : int
+        Number of the promise in `reliability.page.PROMISES`.
+    done : str
+        What was done, with how often.
+    found : mapping
+        What was measured, by what it is, with its unit: `{"growth, MB": 1.2}`.
+    holds : bool
+        Whether that is what is promised.
+    seconds : float
+        What it took.
+    """
+
+    promise: int
+    done: str
+    found: Mapping[str, Any]
+    holds: bool
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Tells how far a measurement is, and how much it is to do.
+
+    Parameters
+    ----------
+    quick : bool
+        A trial: each `size` is the second of its arguments. What it finds is not kept.
+    say : callable, optional
+        Where a line goes; by default it is printed at once.
+    """
+
+    quick: bool = False
+    say: Callable[[str], None] = lambda words: print(words, flush=True)
+
+    def __call__(self, words: str) -> None:
+        self.say(f"  {words}")
+
+    def size(self, whole: int, trial: int) -> int:
+        """How often or how long: as promised, or for a trial."""
+        return trial if self.quick else whole
+
+
+def machine() -> dict[str, str | int]:
+    """Processor and the cores of it that this process may use."""
+    lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return {
+        "processor": names[0] if names else os.uname().machine,
+        "cores": len(os.sched_getaffinity(0)),
+    }
+
+
+def file_of(name: str) -> Path:
+    """Where the rows of a measurement are kept."""
+    return KEPT / f"{name}.json"
+
+
+def keep(name: str, rows: list[Row], seconds: float) -> None:
+    """Write the rows of a measurement, beside first: an interrupted one leaves the former."""
+    told = {
+        "command": f"python -m reliability {name}",
+        "machine": machine(),
+        "date": time.strftime("%Y-%m-%d", time.gmtime()),
+        "seconds": round(seconds, 1),
+        "rows": [asdict(row) for row in rows],
+    }
+    KEPT.mkdir(exist_ok=True)
+    beside = file_of(name).with_suffix(".part")
+    beside.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    beside.replace(file_of(name))
+
+
+def kept(name: str) -> dict[str, Any]:
+    """What `keep` has written: command, machine, date, seconds and rows."""
+    told: dict[str, Any] = json.loads(file_of(name).read_text(encoding="utf-8"))
+    return {**told, "rows": [Row(**row) for row in told["rows"]]}

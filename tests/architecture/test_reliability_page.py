@@ -1,0 +1,65 @@
+"""The page of what must not break says what was measured, and names tests that exist."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from reliability import page as pages, rows
+from reliability.page import MEASUREMENTS, PAGE, PROMISES, page
+from reliability.rows import KEPT, ROOT, Progress, Row
+
+ROW = Row(9, "a million steps", {"growth, MB": 1.25, "curve": [1.0, 2.0]}, True, 61.0)
+
+
+def test_the_page_is_that_of_what_is_kept():
+    assert PAGE.read_text(encoding="utf-8") == page()
+
+
+def test_every_file_is_of_a_measurement_that_exists():
+    assert {path.stem for path in KEPT.glob("*.json")} <= set(MEASUREMENTS)
+
+
+@pytest.mark.parametrize("number", PROMISES)
+def test_named_tests_exist(number):
+    missing = [name for name in PROMISES[number].tests if not (ROOT / name).exists()]
+    assert missing == []
+
+
+def test_every_promise_is_held_by_tests_or_measured():
+    measured = {
+        row["promise"]
+        for path in KEPT.glob("*.json")
+        for row in json.loads(path.read_text())["rows"]
+    }
+    assert list(PROMISES) == list(range(1, 16)) and measured <= set(PROMISES)
+    # No machine of continuous integration has a GPU: there the page says what was measured once.
+    held = {number for number, promise in PROMISES.items() if promise.tests} | {12}
+    assert set(PROMISES) - held - measured <= {9}
+
+
+def test_what_is_kept_comes_back_and_is_shown(monkeypatch, tmp_path):
+    monkeypatch.setattr(rows, "KEPT", tmp_path / "kept")
+    monkeypatch.setattr(pages, "MEASUREMENTS", ("rows",))
+    broken = Row(10, "a worker stopped", {"named after, s": 11}, False, 12.0)
+    rows.keep("rows", [ROW, broken], 73.0)
+    kept = rows.kept("rows")
+    assert kept["rows"] == [ROW, broken] and kept["command"] == "python -m reliability rows"
+    assert [path.name for path in (tmp_path / "kept").iterdir()] == ["rows.json"]
+    text = page()
+    assert "| `rows` | a million steps | growth, MB: 1.25; curve: 1, 2 | yes | 61 s |" in text
+    assert "| named after, s: 11 | **no** | 12 s |" in text.replace("a worker stopped ", "")
+    assert "| 1.2 min | " in text
+
+
+def test_a_trial_is_small():
+    assert Progress().size(100, 2) == 100 and Progress(quick=True).size(100, 2) == 2
+
+
+def test_what_is_no_measurement_is_refused_by_name():
+    run = [sys.executable, "-m", "reliability", "nothing"]
+    done = subprocess.run(run, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 2 and "NAME is 'nothing'; expected one of" in done.stderr
