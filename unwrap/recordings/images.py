@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from unwrap.recordings.arrays import MAX_BYTES
 from unwrap.recordings.recording import Recording, recording_of
 from unwrap.signal import ADC_BITS
-from unwrap.support import in_one_line
+from unwrap.support import MAX_BYTES, in_one_line
 
 HIGHEST_MM = 2**16 - 1
 """Farthest distance that a depth image can hold; farther ones are stored as this."""

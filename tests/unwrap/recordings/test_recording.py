@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from unwrap.recordings import arrays as arrays_module
-from unwrap.recordings.arrays import read_arrays
+from unwrap.support import array_files as arrays_module
 from unwrap.recordings.recording import (
     ARRAYS,
     NoUsablePixelError,
@@ -17,6 +16,7 @@ from unwrap.recordings.recording import (
     recording_of,
     with_gray,
 )
+from unwrap.support.array_files import read_arrays
 
 WORDS = np.random.default_rng(0).integers(1, 4095, (4, 6, 8)).astype(np.uint16)
 GRAY = np.random.default_rng(1).integers(0, 4096, (6, 8)).astype(np.uint16)
