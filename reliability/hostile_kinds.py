@@ -31,16 +31,21 @@ class Kind:
         Fills an empty folder with a file and what belongs to it; returns the file.
     read : callable
         Reads the file, and what belongs to it, as a user's call does.
+    share : float
+        Of the changes that other kinds have: some take seconds to read.
     """
 
     name: str
     make: Callable[[Path], Path]
     read: Callable[[Path], object]
+    share: float = 1.0
 
 
 def _config(section: str, name: str) -> Callable[[Path], Path]:
     def make(folder: Path) -> Path:
-        return Path(shutil.copy(ROOT / "configs" / section / f"{name}.yaml", folder / "a.yaml"))
+        # All of them: some name others beside them.
+        shutil.copytree(ROOT / "configs", folder / "configs")
+        return folder / "configs" / section / f"{name}.yaml"
 
     return make
 
@@ -152,7 +157,7 @@ def _read_thinned(path: Path) -> object:
 def _recorded(name: str) -> Callable[[Path], Path]:
     def make(folder: Path) -> Path:
         from conftest import write_tiny_bank
-        from served_drives import record, write_folder
+        from word_banks import record, write_folder
 
         from agents.cli.cameras import read_camera
         from shotenv.config import SensorConfig, env_config, find_config, read_config
@@ -393,24 +398,25 @@ def _read_truth(path: Path) -> object:
     return read_truth(path, (2, 6, 8))
 
 
+LAYOUT = {"height": 16, "width": 24, "row_bytes": 40, "trailer_rows": 3}
 DISTANCES = [np.full((16, 24), metres) for metres in (1.5, 2.5)]
 
 
-def _camera(camera: str, name: str, size: tuple[int, int] = (16, 24)) -> Callable[[Path], Path]:
+def _camera(camera: str, name: str) -> Callable[[Path], Path]:
     def make(folder: Path) -> Path:
         import camera_files as files
 
-        path, frequencies_hz = folder / name, {"mlx75027": (80e6, 60e6)}.get(camera, (24e6,))
-        layout = {"height": size[0], "width": size[1]}
+        path, frequencies_hz = folder / name, {"arducam_b0548": (90e6, 15e6)}.get(camera, (24e6,))
         if camera == "kinect_v2":
             frames = 100 * np.random.default_rng(0).standard_normal((1, 9, *files.KINECT_SIZE))
             files.write_kinect(path, frames)
             return path
-        family = "mlx75027" if camera == "mlx75027" else "epc660"
+        family = "arducam_b0548" if camera == "arducam_b0548" else "epc660"
         planes = files.whole(files.planes(family, DISTANCES, frequencies_hz))
-        if camera == "mlx75027":
-            files.small_camera(folder, camera, layout=layout)
-            files.write_raw12(path, planes)
+        if camera == "arducam_b0548":
+            files.small_camera(folder, camera, layout=LAYOUT)
+            trailer = bytes(LAYOUT["trailer_rows"] * LAYOUT["row_bytes"])
+            files.write_raw12(path, planes, row_bytes=LAYOUT["row_bytes"], trailer=trailer)
         elif camera == "epc660_wire":
             files.write_wire(path, planes[:, 0])
         else:
@@ -509,9 +515,9 @@ KINDS = (
     Kind("training's checkpoint", _checkpoint, _read_checkpoint),
     Kind("study's result (JSON)", _job("job.json"), _read_job),
     Kind("study's result (npz)", _job("job.npz"), _read_job),
-    Kind("evaluation's results", _report("results.json"), _read_report),
-    Kind("evaluation's timeline", _report("timeline.json"), _read_report),
-    Kind("evaluation's choices", _report("choices.json"), _read_report),
+    Kind("evaluation's results", _report("results.json"), _read_report, 0.1),
+    Kind("evaluation's timeline", _report("timeline.json"), _read_report, 0.1),
+    Kind("evaluation's choices", _report("choices.json"), _read_report, 0.1),
     Kind("evaluation's frames", _report("frames.npz"), _read_report),
     Kind("wiggle table", _wiggle, _read_wiggle),
     Kind("recording (npy)", _recording("frames.npy"), _read_recording),
@@ -522,7 +528,7 @@ KINDS = (
     Kind("ego motion (CSV)", _ego, _read_ego),
     Kind("recording (HDF5)", _camera("epc660_hdf5", "log.h5"), _read_camera("epc660_hdf5")),
     Kind("recording (wire)", _camera("epc660_wire", "log.bin"), _read_camera("epc660_wire")),
-    Kind("recording (raw)", _camera("mlx75027", "log.raw"), _read_camera("mlx75027")),
+    Kind("recording (raw)", _camera("arducam_b0548", "log.raw"), _read_camera("arducam_b0548")),
     Kind("recording (Kinect)", _camera("kinect_v2", "log.h5"), _read_camera("kinect_v2")),
     Kind("scene (OBJ)", _scene("scene.obj"), _read_scene),
     Kind("scene (PLY)", _scene("scene.ply"), _read_scene),
