@@ -35,6 +35,7 @@ from shotenv.config import BankConfig
 from unwrap.storage import (
     Listing,
     Place,
+    StoredFile,
     damaged_files,
     fetch,
     publish_contents,
@@ -180,8 +181,8 @@ def fetch_bank(url: str) -> Path:
     return folder
 
 
-def verify_published(url: str) -> tuple[str, ...]:
-    """Names of the files at `url` that are missing or not as they were published; empty is good.
+def verify_published(url: str) -> tuple[StoredFile, ...]:
+    """Files at `url` that are missing or not as they were published; empty is good.
 
     Raises
     ------

@@ -82,8 +82,8 @@ def _checked_pieces(place: Place, file: StoredFile) -> Iterator[bytes]:
 
 def damaged_files(
     place: Place, listing: Listing, *, tick: Callable[[int], object] = lambda _: None
-) -> tuple[str, ...]:
-    """Paths of the files of `listing` that are missing there or have another digest.
+) -> tuple[StoredFile, ...]:
+    """Files of `listing` that are missing there or have another digest; empty is good.
 
     Raises
     ------
@@ -96,5 +96,5 @@ def damaged_files(
             for piece in _checked_pieces(place, file):
                 tick(len(piece))
         except DamagedError:
-            damaged.append(file.path)
+            damaged.append(file)
     return tuple(damaged)

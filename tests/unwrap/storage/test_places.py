@@ -197,7 +197,7 @@ def test_damaged_objects_are_named_and_never_come_to_their_name(
     assert damaged.sha256 in str(refusal.value) and damaged.path in str(refusal.value)
     assert not (tmp_path / "fetched" / damaged.path).exists()
     assert list((tmp_path / "fetched").rglob(".*")) == []
-    assert damaged_files(place, listing) == (damaged.path,)
+    assert damaged_files(place, listing) == (damaged,)
     if (change is not None and len(change(content)) != len(content)) or change is None:
         assert listing.files[2].path.split("/")[0] not in standing_parts(place, "thing")
 
