@@ -97,19 +97,11 @@ def verify_arguments(parser: ArgumentParser) -> None:
 
 def verify_bank(arguments: Namespace) -> int:
     """Check every file of a bank against its checksum, at a URL where it lies there."""
-    from shotenv.bank import cure_for, open_bank, verify, verify_published
+    from shotenv.bank import cure_for, open_bank, verify
     from unwrap.storage import is_url
 
     if is_url(arguments.bank):
-        damaged = verify_published(arguments.bank)
-        for file in damaged:
-            where = f"{arguments.bank}/{file.object_name} ({file.path})"
-            say(f"shotenv: {where} is missing or damaged; delete it and publish the bank again")
-        if not damaged:
-            print(f"{arguments.bank}: every file is as it was published")
-        numbers = {"folder": arguments.bank, "damaged": [file.path for file in damaged]}
-        write_numbers(arguments, numbers)
-        return FAILED if damaged else DONE
+        return _verify_published(arguments)
     bank = open_bank(arguments.bank, render=False)
     with progress(len(bank.clips), "verifying", "clip") as bar:
         damaged = verify(bank.folder, tick=bar.update)
@@ -118,6 +110,20 @@ def verify_bank(arguments: Namespace) -> int:
     if not damaged:
         print(f"{bank.folder}: every file is as it was written")
     write_numbers(arguments, {"folder": str(bank.folder), "damaged": list(damaged)})
+    return FAILED if damaged else DONE
+
+
+def _verify_published(arguments: Namespace) -> int:
+    from shotenv.bank import verify_published
+
+    url = arguments.bank
+    damaged = verify_published(url)
+    for file in damaged:
+        where = f"{url}/{file.object_name} ({file.path})"
+        say(f"shotenv: {where} is missing or damaged; delete it and publish the bank again")
+    if not damaged:
+        print(f"{url}: every file is as it was published")
+    write_numbers(arguments, {"folder": url, "damaged": [file.path for file in damaged]})
     return FAILED if damaged else DONE
 
 
