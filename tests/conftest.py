@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import torch
 
-from shotenv.bank.store import write_clip, write_manifest
+from shotenv.bank.files.store import write_clip, write_manifest
 from shotenv.config.bank import BankConfig
 from shotenv.config.families import FAMILIES
 from shotenv.config.reader import find_config, read_config

@@ -14,8 +14,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from shotenv.bank.layout import ARRAYS, BankError, Manifest, TableOfContents, TruthLevel
-from shotenv.bank.store import read_manifest
+from shotenv.bank.files import (
+    ARRAYS,
+    BankError,
+    Manifest,
+    TableOfContents,
+    TruthLevel,
+    read_manifest,
+)
 from shotenv.config import TRAINING_FAMILIES, Split
 from shotenv.sensor import Exposure
 from unwrap.signal import Shots

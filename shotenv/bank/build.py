@@ -9,9 +9,18 @@ from pathlib import Path
 from filelock import FileLock
 
 from shotenv.bank.clip_jobs import ClipJob, clip_jobs
-from shotenv.bank.folders import SOURCE, bank_folder, identity, was_rendered_from
-from shotenv.bank.layout import CLIPS, MANIFEST, BankError, frame_bytes
-from shotenv.bank.store import read_clip_record, write_manifest
+from shotenv.bank.files import (
+    CLIPS,
+    MANIFEST,
+    SOURCE,
+    BankError,
+    bank_folder,
+    frame_bytes,
+    identity,
+    read_clip_record,
+    was_rendered_from,
+    write_manifest,
+)
 from shotenv.config import BankConfig
 from shotenv.render.backend import available_cores, require_device, run_jobs
 from unwrap.signal import Shots

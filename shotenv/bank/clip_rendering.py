@@ -8,8 +8,7 @@ import numpy as np
 import torch
 
 from shotenv.bank.clip_jobs import ClipJob
-from shotenv.bank.layout import ARRAYS, BankError
-from shotenv.bank.store import write_clip
+from shotenv.bank.files import ARRAYS, BankError, write_clip
 from shotenv.config import BankConfig, Family
 from shotenv.render import FrameRenderer, RenderedFrame
 from shotenv.scenes import own_world, read_scene

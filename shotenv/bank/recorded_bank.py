@@ -8,8 +8,7 @@ import torch
 from torch import Tensor
 
 from shotenv.bank.bank import Clip, MappedClips
-from shotenv.bank.layout import RecordedContents, TruthLevel
-from shotenv.bank.store import read_recorded_contents
+from shotenv.bank.files import RecordedContents, TruthLevel, read_recorded_contents
 from shotenv.bank.word_bank import ClipSettings, WordBank
 from unwrap.signal import RawFrame, Shots
 

@@ -26,6 +26,7 @@ def room(name: str, *imports: str) -> None:
 SIGNAL = ("unwrap.support", "unwrap.signal")
 UNWRAPPING = (*SIGNAL, "unwrap.depth", "unwrap.networks")
 room("unwrap.support")
+room("unwrap.storage", "unwrap.support")
 room("unwrap.pictures")
 room("unwrap.signal", "unwrap.support")
 room("unwrap.depth", *SIGNAL)
@@ -95,6 +96,7 @@ room(
 )
 room("shotenv.sensor", *SIGNAL, "shotenv.config")
 room("shotenv.laser", "shotenv.config")
+room("shotenv.bank.files", "unwrap.support", "shotenv.config")
 room(
     "shotenv.bank",
     *UNWRAPPING,
@@ -105,6 +107,8 @@ room(
     "shotenv.render.backend",
     "shotenv.scenes",
     "shotenv.sensor",
+    "shotenv.bank.files",
+    "unwrap.storage",
 )
 room(
     "shotenv.bank.listing",
@@ -193,6 +197,7 @@ ONLY_IN = {
     "onnx": ("unwrap/export/", "agents/deploy/"),
     "onnxruntime": ("unwrap/export/", "agents/deploy/"),
     "openvino": "unwrap/networks/",
+    "fsspec": "unwrap/storage/",
     "h5py": ("unwrap/cameras/files/", "unwrap/cameras/writing/"),
 }
 SOURCES = sorted(

@@ -9,8 +9,8 @@ import pytest
 from shotenv.bank import build as build_module
 from shotenv.bank.build import build_bank
 from shotenv.bank.clip_jobs import clip_jobs
-from shotenv.bank.folders import bank_folder as bank_folder_of
-from shotenv.bank.layout import BankError
+from shotenv.bank.files.folders import bank_folder as bank_folder_of
+from shotenv.bank.files.layout import BankError
 from shotenv.config.bank import BankConfig
 from shotenv.config.families import FAMILIES, SHIFT_FAMILIES
 from shotenv.config.reader import ConfigError, find_config, merged, read_config

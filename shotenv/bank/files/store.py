@@ -1,7 +1,8 @@
 """Files of a bank: written whole or not at all, and refused by name when they are damaged.
 
 A clip is written into a hidden folder, flushed, and renamed; so whatever stands under a final
-name is complete. Nothing in a bank is unpickled to be read. What lies where: `shotenv.bank.layout`.
+name is complete. Nothing in a bank is unpickled to be read. What lies where:
+`shotenv.bank.files.layout`.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import ValidationError
 
-from shotenv.bank.layout import (
+from shotenv.bank.files.folders import fetched_banks
+from shotenv.bank.files.layout import (
     ARRAYS,
     CLIP_RECORD,
     CLIPS,
@@ -252,6 +254,9 @@ def _validated(model, content: dict, path: Path):
 
 def cure_for(path: Path) -> str:
     """What mends a bank in which the file `path` is damaged."""
+    if fetched_banks() in path.parents:
+        name = path.relative_to(fetched_banks()).parts[0]
+        return f"delete {fetched_banks() / name}, and it is fetched again"
     if path.name in (THINNED_CONTENTS, THINNED_FILE):
         return "thin the bank again, or install shotenv again where the bank is its own"
     if any((parent / RECORDED_CONTENTS).is_file() for parent in path.parents[:3]):
