@@ -122,8 +122,7 @@ def opening(folder: Path) -> Iterator[Point]:
 
 def list_frames(folder: Path, frames: int) -> None:
     """A bank of black frames of 16 x 16 pixels that takes next to no disk."""
-    from shotenv.bank.layout import ARRAYS, ClipRecord
-    from shotenv.bank.store import write_manifest
+    from shotenv.bank.files import ARRAYS, ClipRecord, write_manifest
 
     records = []
     for number in range(frames // LONG_CLIP):

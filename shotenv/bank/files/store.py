@@ -39,8 +39,8 @@ from shotenv.config import BankConfig, one_sentence
 from unwrap.support import read_npy_header, write_json
 
 Contents = TypeVar("Contents", bound=TableOfContents)
-LARGEST_JSON_BYTES = 64 * 2**20
-"""A manifest has some 2 kB for each clip."""
+LARGEST_JSON_BYTES = 512 * 2**20
+"""A manifest has some 85 bytes for each frame: six million of them."""
 
 
 def write_clip(
