@@ -109,7 +109,8 @@ PLACES = {
     "unwrap.export": Box(468, 620, *CELLAR),
     "unwrap.storage": Box(628, 680, *CELLAR),
     "unwrap.pictures": Box(684, 748, *CELLAR),
-    "unwrap.support": Box(756, 970, *CELLAR),
+    "unwrap.execution": Box(756, 856, *CELLAR),
+    "unwrap.support": Box(862, 970, *CELLAR),
 }
 """Where each room is drawn. Rooms on the frame's way touch the hallway of their floor."""
 

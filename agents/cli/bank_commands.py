@@ -13,7 +13,9 @@ from agents.cli.command import (
     FAILED,
     Command,
     add_config,
+    add_executor,
     add_json,
+    execution_of,
     section_of,
     write_numbers,
 )
@@ -22,7 +24,7 @@ from unwrap.support import progress, say, write_bytes
 
 
 def render_arguments(parser: ArgumentParser) -> None:
-    """What is rendered, where to, and by how many processes."""
+    """What is rendered, where to, and where it is computed."""
     add_config(parser, BankConfig, "bank/starter.yaml")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the bank")
     parser.add_argument(
@@ -30,7 +32,7 @@ def render_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--path", type=Path, metavar="FILE", help="ways through it, lights (YAML)")
     parser.add_argument("--materials", type=Path, metavar="FILE", help="its surfaces (YAML)")
-    parser.add_argument("--workers", type=PositiveInt, metavar="N", help="processes; one per core")
+    add_executor(parser, "clips")
 
 
 def render_bank(arguments: Namespace) -> int:
@@ -47,7 +49,7 @@ def render_bank(arguments: Namespace) -> int:
         config = own_bank(config, scene, way, materials)
     elif any(given is not None for given in (scene, way, materials)):
         raise ConfigError("--scene, --path and --materials: expected the first two, or none")
-    folder = build_bank(config, arguments.out, workers=arguments.workers)
+    folder = build_bank(config, arguments.out, **execution_of(arguments))
     print(f"The bank is in {folder}")
     return DONE
 

@@ -15,6 +15,7 @@ from shotenv.scenes import own_world, read_scene
 from shotenv.sensor import capture_gray, gray_exposure_s
 from shotenv.world import draw_world
 from shotenv.world.geometry import World, ground_speed_m_s, mounted, yaw_rate_rad_s
+from unwrap.execution import visible
 
 METER_REDUCTION = 4
 """The light meter sees one pixel where the camera sees so many each way; assumed."""
@@ -27,6 +28,19 @@ MOST_WORLDS = 64
 
 SEEDS_APART = 2**32
 """From the seed of one of them to the next: no other clip of any bank has seeds so far up."""
+
+
+def render_missing(job: ClipJob) -> None:
+    """In a worker: render a clip, unless the same task was begun before and came to its end.
+
+    Raises
+    ------
+    WorkerError
+        This machine does not see the bank's folder.
+    """
+    visible(job.folder.parent)
+    if not job.stands:
+        render_clip(job)
 
 
 def render_clip(job: ClipJob) -> str:
