@@ -11,6 +11,7 @@ one that comes with the package.
     published.py        a bank on a place (`s3://...`): published there clip by clip, fetched
     opening.py          a bank by name, path or URL
     bank.py             a bank that is open: its clips, splits and frames; one with every pixel
+    clip_arrays.py      its arrays on disk, opened as they are asked for
     thinned.py          one that has a pixel of each few, and what was made of its full frames
     compatibility.py    whether a sensor and a frame rate are those it was made for
     word_bank.py        one that has what a camera delivered, in place of light

@@ -181,7 +181,7 @@ def _render(jobs: Sequence[ClipJob], workers: int | None, executor: Executor) ->
 
 def bank_bytes(config: BankConfig, frames: int) -> int:
     """Bytes on disk of `frames` frames."""
-    return frames * frame_bytes(config.camera.height, config.camera.width)
+    return frames * frame_bytes(config.camera.height, config.camera.width, config.storage)
 
 
 def rendering_minutes(config: BankConfig, frames: int) -> float:

@@ -69,7 +69,8 @@ def render_clip(job: ClipJob) -> str:
         "yaw_rate_rad_s": [yaw_rate_rad_s(world.ego, time) for time in times],
         "gray_exposure_s": exposure_s.tolist(),
     }
-    write_clip(job.folder, {**light, "gray": gray.numpy().astype(np.uint16)}, metadata)
+    arrays = {**light, "gray": gray.numpy().astype(np.uint16)}
+    write_clip(job.folder, arrays, metadata, storage=config.storage)
     return job.name
 
 

@@ -203,6 +203,7 @@ ONLY_IN = {
     "onnxruntime": ("unwrap/export/", "agents/deploy/"),
     "openvino": "unwrap/networks/",
     "fsspec": "unwrap/storage/",
+    "backports": "shotenv/bank/files/",
     "h5py": ("unwrap/cameras/files/", "unwrap/cameras/writing/"),
 }
 SOURCES = sorted(

@@ -1,3 +1,4 @@
+from .damage import cure_for as cure_for
 from .folders import (
     SHIPPED as SHIPPED,
     SOURCE as SOURCE,
@@ -26,10 +27,11 @@ from .layout import (
     TableOfContents as TableOfContents,
     ThinnedContents as ThinnedContents,
     TruthLevel as TruthLevel,
+    array_file as array_file,
     frame_bytes as frame_bytes,
 )
+from .packed import PackedArray as PackedArray
 from .store import (
-    cure_for as cure_for,
     read_clip_record as read_clip_record,
     read_manifest as read_manifest,
     read_recorded_contents as read_recorded_contents,

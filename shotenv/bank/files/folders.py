@@ -51,6 +51,9 @@ def identity(config: BankConfig) -> dict[str, Any]:
     """
     unrelated = {"sensor": set(ACQUISITION_FIELDS), "own_scene": {"file", "most_faces"}}
     content = config.model_dump(mode="json", exclude=unrelated)
+    # Not named where it is as it was before there was a choice: those banks stay what they are.
+    if config.storage == "float32":
+        del content["storage"]
     return {"rendering_version": RENDERING_VERSION, "config": content}
 
 

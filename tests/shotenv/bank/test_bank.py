@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from shotenv.bank.bank import MappedClips
+from shotenv.bank.clip_arrays import MappedClips
 from shotenv.bank.files.layout import ARRAYS, BankError, frame_bytes
 from shotenv.bank.files.store import read_clip_record, verify, write_clip, write_manifest
 from shotenv.bank.opening import open_bank
