@@ -1,4 +1,6 @@
 from .agent import (
+    MOST_HIDDEN as MOST_HIDDEN,
+    WIDEST as WIDEST,
     AgentConfig as AgentConfig,
     DqnConfig as DqnConfig,
     PpoConfig as PpoConfig,

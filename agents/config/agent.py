@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from unwrap.support import Fraction, NonNegative, Positive, Range, Section, check_range
 
@@ -20,17 +19,25 @@ SECTIONS: Final[dict[Algorithm, frozenset[str]]] = {
     "regression": frozenset(("regression",)),
 }
 """Which of them count for an algorithm."""
+# Assumed limits: beyond them no number is meant, and memory or time would end.
+Count = Annotated[int, Field(ge=1, le=10**9)]
+Batch = Annotated[int, Field(ge=2, le=10**6)]
+Few = Annotated[int, Field(ge=1, le=4096)]
+WIDEST, MOST_HIDDEN = 1024, 14
+"""Units of a layer, and hidden layers, of the network that a scheduler is saved as."""
+HIGHEST_PRICE = 1e6
+Width = Annotated[int, Field(ge=1, le=WIDEST)]
 
 
 class PpoConfig(Section):
     """Proximal policy optimisation, by stable-baselines3; with a memory by sb3-contrib."""
 
-    total_steps: int = Field(65_536, ge=1, description="environment steps in all")
-    num_envs: int = Field(16, ge=1, description="environments in the batch")
-    drives: int = Field(24, ge=1, description="different drives to train on, again and again")
-    rollout_steps: int = Field(128, ge=2, description="steps of each environment per update")
-    batch_size: int = Field(512, ge=2, description="steps per gradient batch")
-    epochs: int = Field(10, ge=1, description="passes over a rollout")
+    total_steps: Count = Field(65_536, description="environment steps in all")
+    num_envs: Few = Field(16, description="environments in the batch")
+    drives: Count = Field(24, description="different drives to train on, again and again")
+    rollout_steps: Batch = Field(128, description="steps of each environment per update")
+    batch_size: Batch = Field(512, description="steps per gradient batch")
+    epochs: Count = Field(10, description="passes over a rollout")
     learning_rate: Positive = Field(1e-3, description="Adam learning rate")
     gamma: Fraction = Field(0.98, description="discount per frame")
     gae_lambda: Fraction = Field(0.95, description="lambda of the advantage estimate")
@@ -51,44 +58,44 @@ class RecurrentConfig(Section):
 class DqnConfig(Section):
     """Deep Q-learning by stable-baselines3, or with quantiles (QR-DQN) by sb3-contrib."""
 
-    total_steps: int = Field(200_000, ge=1, description="environment steps in all")
-    num_envs: int = Field(8, ge=1, description="environments in the batch")
-    buffer_size: int = Field(200_000, ge=1, description="steps that are remembered")
-    learning_starts: int = Field(2_000, ge=0, description="steps before the first update")
-    gradient_steps: int = Field(2, ge=1, description="updates per step of all environments")
-    batch_size: int = Field(128, ge=2, description="steps per update")
+    total_steps: Count = Field(200_000, description="environment steps in all")
+    num_envs: Few = Field(8, description="environments in the batch")
+    buffer_size: Count = Field(200_000, description="steps that are remembered")
+    learning_starts: int = Field(2_000, ge=0, le=10**9, description="steps before the first update")
+    gradient_steps: Few = Field(2, description="updates per step of all environments")
+    batch_size: Batch = Field(128, description="steps per update")
     learning_rate: Positive = Field(3e-4, description="Adam learning rate")
     gamma: Fraction = Field(0.95, description="discount per frame")
-    target_update: int = Field(4_000, ge=1, description="steps between updates of the target")
+    target_update: Count = Field(4_000, description="steps between updates of the target")
     exploration: Fraction = Field(0.2, description="share of the run until epsilon is at its end")
     epsilon: Fraction = Field(0.05, description="share of random actions from then on")
-    quantiles: int = Field(32, ge=2, description="quantiles of each value, QR-DQN alone")
-    validations: int = Field(20, ge=1, description="times that the policy is judged, evenly spread")
+    quantiles: int = Field(32, ge=2, le=4096, description="quantiles of each value, QR-DQN alone")
+    validations: Count = Field(20, description="times that the policy is judged, evenly spread")
 
 
 class RegressionConfig(Section):
     """Regression of every action's worth on the observation, from counterfactual outcomes."""
 
-    rounds: int = Field(4, ge=1, description="rounds of playing, looking ahead and fitting")
-    drives: int = Field(512, ge=1, description="different training drives")
-    validation_drives: int = Field(
-        24, ge=1, description="validation drives that stop the fit and choose the round"
+    rounds: Count = Field(4, description="rounds of playing, looking ahead and fitting")
+    drives: Count = Field(512, description="different training drives")
+    validation_drives: Count = Field(
+        24, description="validation drives that stop the fit and choose the round"
     )
-    horizon: int = Field(
-        12, ge=1, description="frames that each action is followed for; 1: its own frame alone"
+    horizon: Count = Field(
+        12, description="frames that each action is followed for; 1: its own frame alone"
     )
     gamma: Fraction = Field(0.9, description="discount per frame of those that follow")
     heat_price: NonNegative = Field(
         0.2, description="least price of power at the trip, where heat is short; 0: none"
     )
     heat_near_k: Positive = Field(2.0, description="margin to the trip where it begins, K")
-    stride: int = Field(10, ge=1, description="every how manieth frame of a drive is looked at")
+    stride: Count = Field(10, description="every how manieth frame of a drive is looked at")
     epsilon: Fraction = Field(
         0.5, description="share of random actions in the drive that has most; others have fewer"
     )
-    members: int = Field(5, ge=1, description="networks whose scores are averaged")
-    passes: int = Field(12, ge=1, description="most passes over the frames; the best is kept")
-    batch_size: int = Field(512, ge=2, description="frames per gradient batch")
+    members: Few = Field(5, description="networks whose scores are averaged")
+    passes: Count = Field(12, description="most passes over the frames; the best is kept")
+    batch_size: Batch = Field(512, description="frames per gradient batch")
     learning_rate: Positive = Field(3e-3, description="AdamW learning rate at the start")
     weight_decay: NonNegative = Field(0.03, description="of AdamW")
     noise: NonNegative = Field(
@@ -110,8 +117,9 @@ class AgentConfig(Section):
     """
 
     algorithm: Algorithm = Field("ppo", description="which learner")
-    hidden: tuple[int, ...] = Field(
+    hidden: tuple[Width, ...] = Field(
         (64, 64),
+        max_length=MOST_HIDDEN,
         description="hidden layers of each network; none: a linear ridge, regression alone",
     )
     power_price: Range | None = Field(
@@ -119,7 +127,7 @@ class AgentConfig(Section):
         description="range of the price of power that drives are trained with, drawn "
         "log-uniformly for each; none: that of the environment",
     )
-    seed: int = Field(0, ge=0, description="seed of weights and drives")
+    seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of weights and drives")
     tensorboard: bool = Field(False, description="whether to log for TensorBoard in the folder")
     ppo: PpoConfig = PpoConfig()
     recurrent: RecurrentConfig = RecurrentConfig()
@@ -133,9 +141,23 @@ class AgentConfig(Section):
             return None
         low, high = power_price
         check_range("power_price", power_price)
-        if low <= 0 or not math.isfinite(high):
-            raise ValueError(f"power_price is ({low:g}, {high:g}); expected finite prices above 0")
+        if low <= 0 or high > HIGHEST_PRICE:
+            raise ValueError(
+                f"power_price is ({low:g}, {high:g}); expected prices above 0 and at most "
+                f"{HIGHEST_PRICE:g}"
+            )
         return power_price
+
+    @model_validator(mode="after")
+    def _can_be_saved(self) -> AgentConfig:
+        # The members of a regression stand side by side in the network that is saved.
+        members = self.regression.members if self.algorithm == "regression" else 1
+        if members * max(self.hidden, default=0) > WIDEST:
+            raise ValueError(
+                f"hidden is {self.hidden} and members {members}: {members * max(self.hidden)} "
+                f"units side by side; expected at most {WIDEST}"
+            )
+        return self
 
     def told(self) -> dict[str, object]:
         """What the run depends on, as JSON has it: of the learners those of the `algorithm`."""

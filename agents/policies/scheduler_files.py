@@ -2,23 +2,46 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import math
+import warnings
+from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from pydantic import Field, ValidationError
+from pydantic import Field, StringConstraints, ValidationError, field_validator
 from torch import nn
 
+from agents.config import MOST_HIDDEN, WIDEST
 from agents.policies.score_networks import Activation
-from unwrap.support import Range, Section, write_bytes, write_json
+from shotenv.config import one_sentence
+from unwrap.support import (
+    Range,
+    Section,
+    check_range,
+    read_json,
+    read_regular,
+    write_bytes,
+    write_json,
+)
 
 AGENT_SCHEMA: Final = 5
 WEIGHTS: Final = "policy.safetensors"
 DESCRIPTION: Final = "agent.json"
 PACKAGES: Final = ("shotenv", "torch", "stable-baselines3", "sb3-contrib")
 # Assumed: a damaged or hostile description must not make a network that fills the memory.
-WIDEST, DEEPEST = 1024, 16
+DEEPEST = MOST_HIDDEN + 2
+MOST_DESCRIPTION_BYTES, MOST_WEIGHTS_BYTES = 1 << 20, 1 << 27
+"""Of the two files: a description has some 4 kB, the largest network above 70 MB."""
+# They become identifiers of an exported scheduler's C file, and lines of its comments.
+FeatureName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_]{1,80}$")]
+Word = Annotated[str, StringConstraints(max_length=300)]
+
+
+class UnboundSchedulerWarning(UserWarning):
+    """A scheduler's folder that does not tell which weights its description is of."""
 
 
 def installed_versions() -> dict[str, str]:
@@ -53,17 +76,33 @@ class Provenance(Section):
         Of the packages that it was trained with.
     """
 
-    algorithm: str
-    feature_names: tuple[str, ...]
+    algorithm: Word
+    feature_names: tuple[FeatureName, ...] = Field(min_length=1, max_length=WIDEST)
     power_price: Range | None = None
     training: dict[str, Any] = Field(default_factory=dict)
     environment: dict[str, Any] = Field(default_factory=dict)
-    seed: int = 0
-    versions: dict[str, str] = Field(default_factory=installed_versions)
+    seed: int = Field(0, ge=0)
+    versions: dict[str, Word] = Field(default_factory=installed_versions)
+
+    @field_validator("feature_names")
+    @classmethod
+    def _once_each(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        if len(set(names)) < len(names):
+            raise ValueError("a name stands twice; expected each once")
+        return names
+
+    @field_validator("power_price")
+    @classmethod
+    def _prices_possible(cls, bounds: Range | None) -> Range | None:
+        if bounds is not None:
+            check_range("power_price", bounds)
+            if bounds[0] < 0 or not math.isfinite(bounds[1]):
+                raise ValueError("expected finite prices of at least 0")
+        return bounds
 
 
-class Description(Section):
-    """What `agent.json` holds beside its schema: `Provenance`, and the network's form.
+class Description(Provenance):
+    """What `agent.json` holds beside schema and digest: `Provenance`, and the network's form.
 
     Attributes
     ----------
@@ -75,17 +114,14 @@ class Description(Section):
         0 without one.
     """
 
-    algorithm: str
-    feature_names: tuple[str, ...] = Field(max_length=WIDEST)
     layers: tuple[Annotated[int, Field(ge=1, le=WIDEST)], ...] = Field(
         min_length=2, max_length=DEEPEST
     )
     activation: Activation
     power_price: Range | None
     training: dict[str, Any]
-    environment: dict[str, Any] = Field(default_factory=dict)  # older files have none
-    seed: int
-    versions: dict[str, str]
+    seed: int = Field(ge=0)
+    versions: dict[str, Word]
     memory: int = Field(0, ge=0, le=WIDEST)
 
     @property
@@ -95,16 +131,26 @@ class Description(Section):
 
 
 def write_scheduler(folder: Path, module: nn.Module, description: Description) -> None:
-    """Write `policy.safetensors`, then `agent.json`, each atomically."""
+    """Write `policy.safetensors`, then `agent.json`, each atomically.
+
+    The description has a digest of both, by which parts of two schedulers are told apart.
+    """
     from safetensors.torch import save
 
     # safetensors refuses tensors that do not lie in one piece.
     tensors = {name: value.contiguous() for name, value in module.state_dict().items()}
-    # The description comes last: a folder that has it has the weights, too.
-    write_bytes(folder / WEIGHTS, save(tensors))
-    write_json(
-        folder / DESCRIPTION, {"schema": AGENT_SCHEMA, **description.model_dump(mode="json")}
+    weights, content = (
+        save(tensors),
+        {"schema": AGENT_SCHEMA, **description.model_dump(mode="json")},
     )
+    # The description comes last: a folder that has it has the weights, too.
+    write_bytes(folder / WEIGHTS, weights)
+    write_json(folder / DESCRIPTION, {**content, "digest": _digest_of(content, weights)})
+
+
+def _digest_of(content: Mapping[str, Any], weights: bytes) -> str:
+    told = json.dumps(content, sort_keys=True).encode()
+    return hashlib.sha256(hashlib.sha256(weights).digest() + told).hexdigest()
 
 
 def read_weights(folder: Path, module: nn.Module) -> None:
@@ -113,21 +159,54 @@ def read_weights(folder: Path, module: nn.Module) -> None:
     Raises
     ------
     ValueError
-        They are missing or damaged, of another form, or not all finite; the message names the file.
-    """
-    from safetensors.torch import load_file
+        They are missing or damaged, not those that the description was written with, of another
+        form or type, or not all finite; the message names the file.
 
-    weights = folder / WEIGHTS
+    Warns
+    -----
+    UnboundSchedulerWarning
+        The description, of an earlier version, does not tell which weights it was written with.
+    """
+    from safetensors.torch import load
+
+    path, module_weights = folder / WEIGHTS, module.state_dict()
     try:
-        module.load_state_dict(load_file(weights))
+        content = read_regular(path, MOST_WEIGHTS_BYTES)
+        tensors = load(content)
+        for name, value in tensors.items():
+            # Loading would take the real part of complex numbers, and whole numbers as they are.
+            if name in module_weights and value.dtype != module_weights[name].dtype:
+                expected = module_weights[name].dtype
+                raise ValueError(f"{name} is {value.dtype}; expected {expected}")
+        module.load_state_dict(tensors)
     except Exception as error:  # safetensors has an error type of its own per fault
-        raise ValueError(f"{weights} is not a usable network: {first_line(error)}") from None
+        raise ValueError(f"{path} is not a usable network: {first_line(error)}") from None
     if not all(value.isfinite().all() for value in module.parameters()):
-        raise ValueError(f"{weights} is not a usable network: not all weights are finite")
+        raise ValueError(f"{path} is not a usable network: not all weights are finite")
+    _check_bound(folder, content)
+
+
+def _check_bound(folder: Path, weights: bytes) -> None:
+    """Refuse weights that the folder's description was not written with, where it tells."""
+    path = folder / DESCRIPTION
+    told = read_json(path, MOST_DESCRIPTION_BYTES)
+    digest = told.pop("digest", None)
+    if digest is None:
+        warnings.warn(
+            f"{path} has no digest, as those of earlier versions: whether {WEIGHTS} beside it "
+            "belongs to it cannot be checked; training again writes one",
+            UnboundSchedulerWarning,
+            stacklevel=4,
+        )
+    elif digest != _digest_of(told, weights):
+        raise ValueError(
+            f"{path} and {WEIGHTS} do not belong together, or one was changed; expected both as "
+            "`shotenv train` wrote them"
+        )
 
 
 def read_description(path: Path) -> Description:
-    """What an `agent.json` says.
+    """What an `agent.json` says; `read_weights` compares its digest with the weights.
 
     Raises
     ------
@@ -136,30 +215,29 @@ def read_description(path: Path) -> Description:
         use; the message names the file, and the field.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        # Looked at before the fields: those of another version may have other names.
-        schema = content.pop("schema")
-    except (FileNotFoundError, NotADirectoryError):
+        content = read_json(path, MOST_DESCRIPTION_BYTES)
+    except FileNotFoundError:
         raise ValueError(
             f"{path.parent} holds no scheduler ({path.name} is missing); "
             "`shotenv train --out DIR` makes one"
         ) from None
-    # The last three: JSON that is no table, or a table without a schema.
-    except (UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError, AttributeError):
-        raise ValueError(f"{path} is damaged; expected the description of a scheduler") from None
+    except ValueError as error:
+        raise ValueError(
+            f"{path} is damaged ({error}); expected the description of a scheduler"
+        ) from None
+    # Looked at before the fields: those of another version may have other names.
+    schema = content.pop("schema", None)
     if schema != AGENT_SCHEMA:
         raise ValueError(
             f"{path} has schema {schema!r}, but this version reads {AGENT_SCHEMA}; "
             "train the scheduler again (`shotenv train --out DIR`)"
         )
+    content.pop("digest", None)
     try:
         return Description.model_validate(content)
     except ValidationError as error:
-        fault = error.errors()[0]
-        field = ".".join(map(str, fault["loc"]))
-        got = "" if fault["type"] == "missing" else f", got {fault['input']!r}"
         raise ValueError(
-            f"{path}: {field}: {fault['msg'].lower()}{got}; expected what `shotenv train` writes"
+            f"{path}: {one_sentence(error, Description)}; expected what `shotenv train` writes"
         ) from None
 
 

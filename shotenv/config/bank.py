@@ -23,8 +23,8 @@ from unwrap.support import NonNegative, Positive, Range, Section, check_range
 HIGHEST_SPEED_M_S = 60.0
 """Of the ego: faster than any car that a sensor of 25 m would be put on."""
 
-MOST_FRAMES = 4096
-"""Of one clip."""
+MOST_FRAMES, MOST_CLIPS = 4096, 10**6
+"""Of one clip; of a split and family (assumed: more would not fit on any disk)."""
 
 Storage = Literal["float32", "float16"]
 
@@ -35,11 +35,15 @@ class CameraConfig(Section):
     width: int = Field(160, ge=16, le=1280, description="pixels across")
     height: int = Field(120, ge=16, le=960, description="pixels down")
     horizontal_fov_deg: float = Field(60.0, gt=5, lt=150, description="horizontal field of view")
-    samples_per_pixel: int = Field(4, ge=1, description="camera rays per pixel and instant")
+    samples_per_pixel: int = Field(
+        4, ge=1, le=4096, description="camera rays per pixel and instant"
+    )
     gray_instants: int = Field(4, ge=1, le=16, description="instants that make the gray image")
     bounces: int = Field(2, ge=1, le=8, description="surface hits of a light path")
     gray_filter_m: NonNegative = Field(
-        0.3, description="reach of the gray light's filter along a plane, m; 0 filters nothing"
+        0.3,
+        le=100.0,
+        description="reach of the gray light's filter along a plane, m; 0 filters nothing",
     )
     emission: EmissionConfig = EmissionConfig()
 
@@ -64,7 +68,9 @@ class WorldConfig(Section):
     speed_m_s: Range = Field(
         (0.0, 15.0), description="ego speed, m/s; it stands and reverses only if the first is 0"
     )
-    frame_rate_hz: Positive = Field(10.0, description="frames per second of a clip")
+    frame_rate_hz: Positive = Field(
+        10.0, ge=1e-3, le=1e4, description="frames per second of a clip"
+    )
     frames_per_clip: int = Field(16, ge=1, le=MOST_FRAMES, description="frames of one clip")
     mounts: tuple[MountConfig, ...] = Field(
         (MountConfig(),), min_length=1, description="sensor modules of the car, a clip for each"
@@ -93,16 +99,21 @@ class BankConfig(Section):
     sensor: SensorConfig
     camera: CameraConfig = CameraConfig()
     world: WorldConfig = WorldConfig()
-    seed: int = Field(0, ge=0, description="first world seed; clip i has seed + i")
-    train_clips: int = Field(8, ge=0, description="training clips of each family")
-    validation_clips: int = Field(3, ge=0, description="validation clips of each family")
-    test_clips: int = Field(3, ge=0, description="test clips of each family")
-    shift_clips: int = Field(0, ge=0, description="clips of each held-out family")
+    seed: int = Field(0, ge=0, le=2**62, description="first world seed; clip i has seed + i")
+    train_clips: int = Field(8, ge=0, le=MOST_CLIPS, description="training clips of each family")
+    validation_clips: int = Field(
+        3, ge=0, le=MOST_CLIPS, description="validation clips of each family"
+    )
+    test_clips: int = Field(3, ge=0, le=MOST_CLIPS, description="test clips of each family")
+    shift_clips: int = Field(0, ge=0, le=MOST_CLIPS, description="clips of each held-out family")
     shift_mean_speed_m_s: NonNegative = Field(
         0.3, description="mean ego speed over a clip of a held-out family is at least this, m/s"
     )
     clutter_clips: int = Field(
-        0, ge=0, description="further training clips, of the family for training only"
+        0,
+        ge=0,
+        le=MOST_CLIPS,
+        description="further training clips, of the family for training only",
     )
     storage: Storage = Field(
         "float32",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -11,6 +10,13 @@ from shotenv.config.families import Split
 from shotenv.config.laser import LaserConfig
 from shotenv.config.sensor import SensorConfig
 from unwrap.support import NonNegative, Positive, Range, Section, check_range
+
+# Assumed limits: beyond them no number is meant, and what it leads to is too large for float32, or
+# for the memory.
+HEAVIEST = 1e6
+"""Weight of a term of the reward; all terms are of the order of 1."""
+MOST_FRAMES_OF_A_DRIVE = 1_000_000
+"""A day at 10 Hz has 864 000."""
 
 
 def _both_ends(price: object) -> object:
@@ -25,25 +31,32 @@ class RewardConfig(Section):
     `scale` times (weighted terms of 4 DCS minus weighted terms of what was taken).
     """
 
-    error: NonNegative = Field(1.0, description="weight of the depth error term")
-    duty: NonNegative = Field(0.0, description="weight of laser duty relative to always-8")
+    error: NonNegative = Field(1.0, le=HEAVIEST, description="weight of the depth error term")
+    duty: NonNegative = Field(
+        0.0, le=HEAVIEST, description="weight of laser duty relative to always-8"
+    )
     power: Annotated[Range, BeforeValidator(_both_ends)] = Field(
         (0.09, 0.09),
         description="weight of power relative to always-8, its price; (low, high) is drawn "
         "log-uniformly for each drive",
     )
-    trip: NonNegative = Field(0.5, description="weight of a frame without laser")
+    trip: NonNegative = Field(0.5, le=HEAVIEST, description="weight of a frame without laser")
     error_scale_m: Positive = Field(
-        4.0, description="error at which a pixel's term |e| / (|e| + scale) is one half, m"
+        4.0,
+        ge=1e-4,
+        le=1e5,
+        description="error at which a pixel's term |e| / (|e| + scale) is one half, m",
     )
-    scale: Positive = Field(20.0, description="factor of the reward")
+    scale: Positive = Field(20.0, ge=1e-6, le=1e6, description="factor of the reward")
 
     @model_validator(mode="after")
     def _price_possible(self) -> RewardConfig:
         low, high = self.power
         check_range("power", self.power)
-        if low < 0 or not math.isfinite(high):
-            raise ValueError(f"power is ({low:g}, {high:g}); expected finite weights >= 0")
+        if low < 0 or high > HEAVIEST:
+            raise ValueError(
+                f"power is ({low:g}, {high:g}); expected weights from 0 to {HEAVIEST:g}"
+            )
         # Log-uniform: a price of 0 lies infinitely far below every other.
         if low == 0 < high:
             raise ValueError(
@@ -83,8 +96,10 @@ class EnvConfig(Section):
         description="whether the sensor takes fewer shots, in the end none, where those asked for "
         "would trip the laser",
     )
-    frames_per_drive: int = Field(256, ge=2, description="frames of one episode")
-    frame_rate_hz: Positive = Field(10.0, description="frames per second")
+    frames_per_drive: int = Field(
+        256, ge=2, le=MOST_FRAMES_OF_A_DRIVE, description="frames of one episode"
+    )
+    frame_rate_hz: Positive = Field(10.0, ge=1e-3, le=1e4, description="frames per second")
     reward: RewardConfig = RewardConfig()
 
     @model_validator(mode="after")

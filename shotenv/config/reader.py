@@ -20,6 +20,8 @@ limit_yaml()
 Model = TypeVar("Model", bound=Section)
 UNKNOWN_KEY = re.compile(r"does not accept option '([\w.]+)'")
 """What jsonargparse says of a key that a file has and its section has not."""
+MOST_COMPLAINTS, LONGEST_VALUE = 8, 120
+"""Told of one file, which may be wrong in thousands of places; characters of a wrong value."""
 
 
 class ConfigError(ValueError):
@@ -79,7 +81,10 @@ def one_sentence(error: Exception, model: type[Section] | None = None) -> str:
     Of an unknown key it tells the known ones, where `model`, the section read, is given.
     """
     if isinstance(error, ValidationError):
-        return "; ".join(_complaint(detail, model) for detail in error.errors())
+        found = error.errors()
+        told = "; ".join(_complaint(detail, model) for detail in found[:MOST_COMPLAINTS])
+        left = len(found) - MOST_COMPLAINTS
+        return f"{told}; and {left} more" if left > 0 else told
     kept = [line.strip() for line in str(error).splitlines() if "errors.pydantic.dev" not in line]
     return " ".join(" ".join(kept).replace("config.", "").split())
 
@@ -90,7 +95,12 @@ def _complaint(detail: Any, model: type[Section] | None) -> str:
     message = detail["msg"].removeprefix("Value error, ")
     if detail["type"] == "extra_forbidden":
         return _unknown(detail["loc"], model)
-    return f"{where}: {message}, got {detail['input']!r}" if detail["loc"] else message
+    # Of what is missing, the input is all around it.
+    if not detail["loc"] or detail["type"] == "missing":
+        return f"{where}: {message}" if detail["loc"] else message
+    got = repr(detail["input"])
+    shown = got if len(got) <= LONGEST_VALUE else f"{got[:LONGEST_VALUE]}..."
+    return f"{where}: {message}, got {shown}"
 
 
 def _unknown(place: Sequence[Any], model: Any) -> str:

@@ -12,6 +12,10 @@ from unwrap.support import Fraction, NonNegative, Positive, Range, Section, chec
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 Frequency = Annotated[float, Field(ge=1e5, le=1e9)]
 Kelvin = Annotated[float, Field(ge=200.0, le=450.0)]
+MOST_LSB = float(2**16)
+"""Full scale of the widest converter."""
+# Limits of other fields are assumed: far beyond what any imager has, and such that all that is
+# computed from them is finite.
 
 
 ACQUISITION_FIELDS = frozenset(
@@ -48,7 +52,7 @@ class SensorConfig(Section):
     f1_hz: Frequency = Field(24e6, description="first modulation frequency, Hz")
     f2_hz: Frequency = Field(10e6, description="second modulation frequency, Hz")
     sample_period_s: Positive = Field(
-        3.85e-3, le=1.0, description="time from one DCS to the next, s"
+        3.85e-3, ge=1e-7, le=1.0, description="time from one DCS to the next, s"
     )
     integration_s: Range = Field(
         (5.5e-4, 7.5e-4), description="integration time drawn per drive, s"
@@ -91,30 +95,46 @@ class SensorConfig(Section):
     fill_factor: Share = Field(1.0, description="light-sensitive share of a pixel")
     quantum_efficiency: Share = Field(0.28, description="electrons per photon in band")
     contrast: Share = Field(0.85, description="demodulation contrast m")
-    read_noise_e: NonNegative = Field(83.0, description="read noise of one tap, electrons rms")
-    full_well_e: Positive = Field(160e3, description="full well of one tap, electrons")
-    gain_lsb_per_e: Positive = Field(0.0128, description="converter gain, LSB per electron")
+    read_noise_e: NonNegative = Field(
+        83.0, le=1e9, description="read noise of one tap, electrons rms"
+    )
+    full_well_e: Positive = Field(
+        160e3, ge=1.0, le=1e9, description="full well of one tap, electrons"
+    )
+    gain_lsb_per_e: Positive = Field(
+        0.0128, ge=1e-6, le=1e6, description="converter gain, LSB per electron"
+    )
     adc_bits: int = Field(12, ge=8, le=16, description="bits of the converter")
-    offset_std_lsb: NonNegative = Field(17.6, description="std of the tap offset pattern, LSB")
+    offset_std_lsb: NonNegative = Field(
+        17.6, le=MOST_LSB, description="std of the tap offset pattern, LSB"
+    )
     offset_row_share: Fraction = Field(0.5, description="share of offset variance common to a row")
     offset_calibrated_share: Fraction = Field(
         0.95, description="share of the pattern removed by the stored dark-offset map"
     )
     offset_ambient_lsb: NonNegative = Field(
-        8.0, description="row-parity offset that ambient adds at a full tap, LSB"
+        8.0, le=MOST_LSB, description="row-parity offset that ambient adds at a full tap, LSB"
     )
     offset_drift_lsb_per_k: NonNegative = Field(
-        0.0, description="std of the offset pattern's change per kelvin, LSB/K"
+        0.0, le=MOST_LSB, description="std of the offset pattern's change per kelvin, LSB/K"
     )
-    gray_max_exposure_s: Positive = Field(5e-3, description="longest gray exposure, s")
+    gray_max_exposure_s: Positive = Field(
+        5e-3, ge=1e-7, le=10.0, description="longest gray exposure, s"
+    )
     gray_target: Share = Field(0.3, description="mean of full scale aimed at by gray exposure")
     min_snr: NonNegative = Field(
-        3.0, description="decoded amplitude over a sample's noise below which depth is invalid"
+        3.0,
+        le=1e6,
+        description="decoded amplitude over a sample's noise below which depth is invalid",
     )
     saturation_range_m: Positive = Field(
-        6.2, description="d_sat of eq. 6 and 8: wrapped distances from here on are not trusted, m"
+        6.2,
+        ge=1e-4,
+        description="d_sat of eq. 6 and 8: wrapped distances from here on are not trusted, m",
     )
-    max_range_m: Positive = Field(25.0, description="range that is unwrapped and scored, m")
+    max_range_m: Positive = Field(
+        25.0, ge=1e-3, le=1e6, description="range that is unwrapped and scored, m"
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> SensorConfig:

@@ -38,3 +38,10 @@ from .tensors import (
     put as put,
     take as take,
 )
+from .whole_files import (
+    MOST_JSON_BYTES as MOST_JSON_BYTES,
+    open_regular as open_regular,
+    read_json as read_json,
+    read_regular as read_regular,
+    require_regular as require_regular,
+)

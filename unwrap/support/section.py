@@ -4,13 +4,27 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 Range = tuple[float, float]
 """(low, high), see `check_range`."""
+LARGEST = 1e12
+"""Of any quantity that a configuration tells, in its unit, and over the smallest one above 0: no slip
+of the decimal point lies beyond, and squares and products of such numbers are finite in float32."""
+
+
+def _of_sensible_size(value: float) -> float:
+    # Not as `le` of a field, which would win over the closer limit of a field of this type.
+    if value and not 1 / LARGEST <= value <= LARGEST:
+        raise ValueError(f"expected a number of {1 / LARGEST:g} to {LARGEST:g}")
+    return value
+
+
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False), AfterValidator(_of_sensible_size)]
+NonNegative = Annotated[
+    float, Field(ge=0.0, allow_inf_nan=False), AfterValidator(_of_sensible_size)
+]
 
 
 class Section(BaseModel):

@@ -47,28 +47,38 @@ class TrainConfig(Section):
     memory: bool = Field(False, description="give toffusionnet the depth of the frame before")
     width: int = Field(32, ge=4, le=128, description="channels of the first ResNet stage")
     classes: int = Field(5, ge=2, le=MOST_CLASSES, description="wrap classes of tofsegnet")
-    f1_hz: float = Field(24e6, gt=0, description="frequency whose wraps are predicted, Hz")
-    max_range_m: float = Field(25.0, gt=0, description="range that is scored, m")
-    clamp_m: float = Field(30.0, gt=0, description="truth beyond, and the sky, counts as this, m")
-    epochs: int = Field(40, ge=1, description="passes over the training frames")
-    batch_size: int = Field(32, ge=1, description="frames per step")
-    learning_rate: float = Field(3e-3, gt=0, description="highest learning rate")
-    final_learning_rate: float = Field(1e-6, ge=0, description="learning rate at the last step")
-    warmup_share: float = Field(0.1, ge=0, lt=1, description="share of steps that rise linearly")
-    weight_decay: float = Field(0.01, ge=0, description="decoupled decay; 0 is plain Adam")
-    clip_norm: float = Field(
-        0.0, ge=0, description="longest gradient; longer ones are shortened; 0 leaves all"
+    f1_hz: float = Field(
+        24e6, ge=1e5, le=1e9, description="frequency whose wraps are predicted, Hz"
     )
-    equation_7_weight: float = Field(1.0, ge=0, description="weight of the paper's loss, eq. 7")
+    max_range_m: float = Field(25.0, gt=0, le=1e6, description="range that is scored, m")
+    clamp_m: float = Field(
+        30.0, gt=0, le=1e6, description="truth beyond, and the sky, counts as this, m"
+    )
+    epochs: int = Field(40, ge=1, le=10**6, description="passes over the training frames")
+    batch_size: int = Field(32, ge=1, le=10**5, description="frames per step")
+    learning_rate: float = Field(3e-3, gt=0, le=1e3, description="highest learning rate")
+    final_learning_rate: float = Field(
+        1e-6, ge=0, le=1e3, description="learning rate at the last step"
+    )
+    warmup_share: float = Field(0.1, ge=0, lt=1, description="share of steps that rise linearly")
+    weight_decay: float = Field(0.01, ge=0, le=1e3, description="decoupled decay; 0 is plain Adam")
+    clip_norm: float = Field(
+        0.0, ge=0, le=1e12, description="longest gradient; longer ones are shortened; 0 leaves all"
+    )
+    equation_7_weight: float = Field(
+        1.0, ge=0, le=1e6, description="weight of the paper's loss, eq. 7"
+    )
     equation_7_mean_share: float = Field(
         0.85, ge=0, le=1, description="lambda of L_SI; the paper's 1 leaves the mean error free"
     )
-    wrap_weight: float = Field(1.0, ge=0, description="weight of our wrap loss; 0 as in the paper")
+    wrap_weight: float = Field(
+        1.0, ge=0, le=1e6, description="weight of our wrap loss; 0 as in the paper"
+    )
     flip_horizontal: bool = Field(True, description="mirror left and right")
     flip_vertical: bool = Field(False, description="mirror up and down, as the paper does too")
-    contrast: float = Field(0.2, ge=0, description="largest relative change of gamma")
-    brightness: float = Field(0.3, ge=0, description="largest relative change of gain")
-    seed: int = Field(0, ge=0, description="seed of weights, order and augmentation")
+    contrast: float = Field(0.2, ge=0, le=10, description="largest relative change of gamma")
+    brightness: float = Field(0.3, ge=0, le=10, description="largest relative change of gain")
+    seed: int = Field(0, ge=0, le=2**62, description="seed of weights, order and augmentation")
     start_from: str | None = Field(
         None, description="name or path of a network whose layers of equal shape are taken over"
     )

@@ -75,11 +75,11 @@ def test_a_saved_one_is_loaded_by_the_same_door(tmp_path):
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"memory": 10**9}, r"agent\.json: memory: input should be less"),
+        ({"memory": 10**9}, r"agent\.json: memory: Input should be less"),
         ({"memory": 6}, r"policy\.safetensors is not a usable network"),
         ({"layers": [6, 4, 3]}, r"policy\.safetensors is not a usable network"),
         ({"feature_names": list(NAMES[:2])}, r"policy\.safetensors is not a usable network"),
-        ({"feature_names": ["x"] * 2000}, r"agent\.json: feature_names: tuple should have at most"),
+        ({"feature_names": ["x"] * 2000}, r"agent\.json: feature_names: Tuple should have at most"),
     ],
 )
 def test_a_description_that_does_not_fit_is_refused(tmp_path, change, says):
