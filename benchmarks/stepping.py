@@ -13,7 +13,7 @@ import torch
 
 from benchmarks.rows import row
 from benchmarks.turns import alternately
-from shotenv.bank.store import write_clip, write_manifest
+from shotenv.bank.files.store import write_clip, write_manifest
 from shotenv.config import env_config
 from shotenv.decision import open_problem, reset, step
 from shotenv.env import ShotScheduleVectorEnv

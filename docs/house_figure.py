@@ -85,6 +85,7 @@ PLACES = {
     "shotenv.render.backend": Box(196, 302, 420, 446),
     "shotenv.bank": Box(320, 456, 516, BACK[1]),
     "shotenv.bank.listing": Box(330, 446, 521, 543),
+    "shotenv.bank.files": Box(330, 446, 548, 570),
     "shotenv.sensor": Box(320, 456, FRONT[0], 510),
     "shotenv.config": Box(490, 666, *BACK),
     "shotenv.dataset": Box(674, 818, *BACK),
@@ -106,8 +107,10 @@ PLACES = {
     "unwrap.calibration": Box(138, 290, *CELLAR),
     "unwrap.comparison": Box(298, 460, *CELLAR),
     "unwrap.export": Box(468, 620, *CELLAR),
-    "unwrap.pictures": Box(628, 748, *CELLAR),
-    "unwrap.support": Box(756, 970, *CELLAR),
+    "unwrap.storage": Box(628, 680, *CELLAR),
+    "unwrap.pictures": Box(684, 748, *CELLAR),
+    "unwrap.execution": Box(756, 856, *CELLAR),
+    "unwrap.support": Box(862, 970, *CELLAR),
 }
 """Where each room is drawn. Rooms on the frame's way touch the hallway of their floor."""
 

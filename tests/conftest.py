@@ -12,8 +12,9 @@ import signal
 import numpy as np
 import pytest
 import torch
+from hypothesis import settings
 
-from shotenv.bank.store import write_clip, write_manifest
+from shotenv.bank.files.store import write_clip, write_manifest
 from shotenv.config.bank import BankConfig
 from shotenv.config.families import FAMILIES
 from shotenv.config.reader import find_config, read_config
@@ -30,6 +31,11 @@ from unwrap.signal.shots import (
 
 SPEED_OF_LIGHT_M_S = 299_792_458.0
 HEIGHT, WIDTH = 24, 32
+# Property tests draw the same examples each time, so that no run fails that passed before;
+# `--hypothesis-profile long` draws many more, anew each time.
+settings.register_profile("everyday", max_examples=60, derandomize=True, deadline=None, database=None)
+settings.register_profile("long", max_examples=10_000, deadline=None, database=None)
+settings.load_profile("everyday")
 CLIPS, FRAMES_PER_CLIP = 16, 4
 LASER_SOLID_ANGLE_SR = 0.8
 AMBIENT_IRRADIANCE_W_M2 = {

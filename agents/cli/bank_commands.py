@@ -13,7 +13,9 @@ from agents.cli.command import (
     FAILED,
     Command,
     add_config,
+    add_executor,
     add_json,
+    execution_of,
     section_of,
     write_numbers,
 )
@@ -22,7 +24,7 @@ from unwrap.support import progress, say, write_bytes
 
 
 def render_arguments(parser: ArgumentParser) -> None:
-    """What is rendered, where to, and by how many processes."""
+    """What is rendered, where to, and where it is computed."""
     add_config(parser, BankConfig, "bank/starter.yaml")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the bank")
     parser.add_argument(
@@ -30,7 +32,7 @@ def render_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--path", type=Path, metavar="FILE", help="ways through it, lights (YAML)")
     parser.add_argument("--materials", type=Path, metavar="FILE", help="its surfaces (YAML)")
-    parser.add_argument("--workers", type=PositiveInt, metavar="N", help="processes; one per core")
+    add_executor(parser, "clips")
 
 
 def render_bank(arguments: Namespace) -> int:
@@ -47,7 +49,7 @@ def render_bank(arguments: Namespace) -> int:
         config = own_bank(config, scene, way, materials)
     elif any(given is not None for given in (scene, way, materials)):
         raise ConfigError("--scene, --path and --materials: expected the first two, or none")
-    folder = build_bank(config, arguments.out, workers=arguments.workers)
+    folder = build_bank(config, arguments.out, **execution_of(arguments))
     print(f"The bank is in {folder}")
     return DONE
 
@@ -91,14 +93,17 @@ def tell_about_banks(arguments: Namespace) -> int:
 
 def verify_arguments(parser: ArgumentParser) -> None:
     """Which bank."""
-    parser.add_argument("bank", help="name or path of a bank")
+    parser.add_argument("bank", help="name, path or URL of a bank")
     add_json(parser)
 
 
 def verify_bank(arguments: Namespace) -> int:
-    """Check every file of a bank against its checksum."""
+    """Check every file of a bank against its checksum, at a URL where it lies there."""
     from shotenv.bank import cure_for, open_bank, verify
+    from unwrap.storage import is_url
 
+    if is_url(arguments.bank):
+        return _verify_published(arguments)
     bank = open_bank(arguments.bank, render=False)
     with progress(len(bank.clips), "verifying", "clip") as bar:
         damaged = verify(bank.folder, tick=bar.update)
@@ -108,6 +113,37 @@ def verify_bank(arguments: Namespace) -> int:
         print(f"{bank.folder}: every file is as it was written")
     write_numbers(arguments, {"folder": str(bank.folder), "damaged": list(damaged)})
     return FAILED if damaged else DONE
+
+
+def _verify_published(arguments: Namespace) -> int:
+    from shotenv.bank import verify_published
+
+    url = arguments.bank
+    damaged = verify_published(url)
+    for file in damaged:
+        where = f"{url}/{file.object_name} ({file.path})"
+        say(f"shotenv: {where} is missing or damaged; delete it and publish the bank again")
+    if not damaged:
+        print(f"{url}: every file is as it was published")
+    write_numbers(arguments, {"folder": url, "damaged": [file.path for file in damaged]})
+    return FAILED if damaged else DONE
+
+
+def publish_arguments(parser: ArgumentParser) -> None:
+    """Which bank, and where to."""
+    parser.add_argument("bank", help="name or path of a bank that stands")
+    parser.add_argument(
+        "--to", required=True, metavar="URL", help="place, such as s3://bucket/bank"
+    )
+
+
+def publish(arguments: Namespace) -> int:
+    """Publish a bank that stands."""
+    from shotenv.bank import open_bank, publish_bank
+
+    published = publish_bank(open_bank(arguments.bank, render=False), arguments.to)
+    print(f"{published.label} is at {arguments.to}: {published.total_bytes / 1e9:.2f} GB")
+    return DONE
 
 
 def thin_arguments(parser: ArgumentParser) -> None:
@@ -248,6 +284,13 @@ COMMANDS = (
         "signal, saturation and gray of a bank, and how long gray errors last",
         light_arguments,
         measure_light,
+    ),
+    Command(
+        "bank publish",
+        "put a bank on a place (a bucket, a shared disk), from where it is opened by URL",
+        publish_arguments,
+        publish,
+        resumes=True,
     ),
     Command(
         "bank thin",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,9 +10,11 @@ from jsonargparse import ArgumentParser, Namespace
 from agents.cli.command import (
     DONE,
     Command,
+    add_executor,
     add_experiment,
     add_out,
     add_trust,
+    execution_of,
     experiment_of,
     play_on_one_thread,
     prepare_bank,
@@ -174,11 +175,9 @@ def report(arguments: Namespace) -> int:
 
 
 def study_arguments(parser: ArgumentParser) -> None:
-    """Which study, how many at a time, and where its results go."""
+    """Which study, where its jobs run, and where their results go."""
     parser.add_argument("file", type=Path, help="YAML file, such as configs/study/results.yaml")
-    parser.add_argument(
-        "--workers", type=int, default=os.cpu_count() or 1, help="processes, one thread each"
-    )
+    add_executor(parser, "jobs")
     add_out(parser, "runs/study", "folder of the results of each job, and of results.json")
 
 
@@ -187,11 +186,9 @@ def run_study(arguments: Namespace) -> int:
     from agents.config import StudyPlan
     from agents.study import jobs_of, make_leaderboard, run_jobs
 
-    if arguments.workers < 1:
-        raise ConfigError(f"workers is {arguments.workers}; expected at least 1")
     plan = read_config(StudyPlan, arguments.file)
     jobs = jobs_of(plan)
-    run_jobs(jobs, arguments.out, workers=arguments.workers)
+    run_jobs(jobs, arguments.out, **execution_of(arguments))
     found = make_leaderboard(plan, jobs, arguments.out)
     write_json(arguments.out / "results.json", found)
     for preset, table in found["presets"].items():

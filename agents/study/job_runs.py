@@ -1,15 +1,12 @@
-"""Jobs run in processes of their own, one thread each; those that stand are not run again."""
+"""Jobs run in workers, one thread each; those that stand are not run again."""
 
 from __future__ import annotations
 
-import contextlib
-import multiprocessing
-import signal
 import time
-from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections import deque
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from agents.config import DemoConfig
 from agents.evaluation import (
@@ -30,11 +27,36 @@ from agents.study.jobs import REFERENCES, Job
 from agents.training import train_scheduler
 from shotenv.config import EnvConfig
 from shotenv.decision import open_problem
-from unwrap.support import end_with_parent, progress
+from unwrap.execution import Executor, run_tasks, stderr_to, visible
+from unwrap.support import progress
+
+JOBS_PER_WORKER = 1000
+"""Jobs after which a process is replaced by a new one: they leave nothing behind, but who knows."""
 
 
-def run_jobs(jobs: Sequence[Job], folder: Path, *, workers: int) -> None:
+class JobTask(NamedTuple):
+    """One job for a worker, which writes its result below `folder`."""
+
+    job: Job
+    folder: Path
+    depends_on: dict[str, Any]
+
+
+def run_jobs(
+    jobs: Sequence[Job],
+    folder: Path,
+    *,
+    workers: int | None = None,
+    executor: Executor = "local",
+) -> None:
     """Run what does not stand yet in `folder`.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Jobs at a time; one per core by default.
+    executor : "local" or "ray"
+        With "ray", on machines that all see `folder`, and the banks.
 
     Raises
     ------
@@ -44,35 +66,36 @@ def run_jobs(jobs: Sequence[Job], folder: Path, *, workers: int) -> None:
     KeyboardInterrupt
         Ctrl-C; what was finished is kept, and the message says how much.
     """
+    folder = folder.resolve()
+    folder.mkdir(parents=True, exist_ok=True)
     # Renders and predicts, too, what several processes would else do at the same time.
     banks = banks_of(jobs)
     left = [
-        (job, told) for job in jobs if not stands(folder / job.name, told := job.depends_on(banks))
+        JobTask(job, folder, told)
+        for job in jobs
+        if not stands(folder / job.name, told := job.depends_on(banks))
     ]
-    # What is played elsewhere comes after all that trains.
-    waves = [
-        [one for one in left if (one[0].source is not None) is later] for later in (False, True)
-    ]
+    order = _Order(left)
     failed: list[str] = []
-    done = len(jobs) - len(left)
-    with (
-        progress(len(jobs), "study", "job", done=done) as bar,
-        # Not forked: torch's threads do not survive that.
-        ProcessPoolExecutor(
-            workers, multiprocessing.get_context("spawn"), initializer=_begin_worker
-        ) as pool,
-    ):
+    with progress(len(jobs), "study", "job", done=len(jobs) - len(left)) as bar:
         try:
-            for wave in waves:
-                waiting = {pool.submit(run_job, job, folder, told): job for job, told in wave}
-                for future in as_completed(waiting):
-                    if (error := future.exception()) is not None:
-                        failed.append(f"{waiting[future].name}: {error or type(error).__name__}")
-                    bar.update(1)
+            finished = run_tasks(
+                run_job,
+                order.tasks(),
+                executor=executor,
+                workers=workers,
+                # Drives are made of small maps, which gain nothing from more.
+                threads=1,
+                tasks_per_worker=JOBS_PER_WORKER,
+                name=lambda task: task.job.name,
+                keep_going=True,
+            )
+            for task, error in finished:
+                if error is not None:
+                    failed.append(str(error))
+                order.release(task)
+                bar.update(1)
         except KeyboardInterrupt:
-            for process in multiprocessing.active_children():
-                process.terminate()
-            pool.shutdown(cancel_futures=True)
             kept = sum(folder.joinpath(f"{job.name}.json").is_file() for job in jobs)
             raise KeyboardInterrupt(
                 f"{kept} of {len(jobs)} jobs are kept; the same command continues"
@@ -81,6 +104,35 @@ def run_jobs(jobs: Sequence[Job], folder: Path, *, workers: int) -> None:
         raise ValueError(
             f"{len(failed)} of {len(jobs)} jobs failed, the others are kept: {'; '.join(failed)}"
         )
+
+
+class _Order:
+    """What is played elsewhere comes after what trains it, and all else in its order."""
+
+    def __init__(self, tasks: Sequence[JobTask]) -> None:
+        names = {task.job.name for task in tasks}
+        self._left = len(tasks)
+        self._ready: deque[JobTask] = deque()
+        self._held: dict[str, list[JobTask]] = {}
+        for task in tasks:
+            source = task.job.source
+            if source is not None and source.name in names:
+                self._held.setdefault(source.name, []).append(task)
+            else:
+                self._ready.append(task)
+
+    def tasks(self) -> Iterator[JobTask | None]:
+        """All of them; None while those that are left wait for others."""
+        while self._left:
+            if self._ready:
+                self._left -= 1
+                yield self._ready.popleft()
+            else:
+                yield None
+
+    def release(self, finished: JobTask) -> None:
+        """What waits for this one can begin; where it failed, that is told by each of them."""
+        self._ready.extend(self._held.pop(finished.job.name, ()))
 
 
 def banks_of(jobs: Sequence[Job]) -> dict[str, str]:
@@ -95,14 +147,12 @@ def bank_of(config: EnvConfig) -> str:
     return open_problem(config.model_copy(update={"split": "all"})).bank.fingerprint
 
 
-def run_job(job: Job, folder: Path, depends_on: dict[str, Any]) -> None:
+def run_job(task: JobTask) -> None:
     """Run one job; its bars and lines go to a file beside its result."""
-    began, stem = time.process_time(), folder / job.name
+    began, (job, folder, depends_on) = time.process_time(), task
+    stem = visible(folder) / job.name
     stem.parent.mkdir(parents=True, exist_ok=True)
-    with (
-        stem.with_suffix(".log").open("w", encoding="utf-8") as log,
-        contextlib.redirect_stderr(log),
-    ):
+    with stderr_to(stem.with_suffix(".log")):
         config, arrays = job.config, {}
         if job.kind == REFERENCES:
             study = config.study
@@ -170,12 +220,3 @@ def _played(config: DemoConfig, at_price: Any, prices: Sequence[float]) -> Playe
         prices,
         names=lambda policy: "scheduler" if isinstance(policy, Scheduler) else str(policy),
     )
-
-
-def _begin_worker() -> None:
-    """One thread; Ctrl-C, which a terminal sends to all, ends it without a word."""
-    import torch
-
-    end_with_parent()
-    torch.set_num_threads(1)
-    signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -4,14 +4,14 @@
 user's cache folder on first use; `open_bank("path/to/bank")` opens a folder; `open_bank("pocket")`
 one that comes with the package.
 
-    layout.py           what lies in a bank's folder: arrays, records, table of contents
-    store.py            writing that whole or not at all; reading and verifying it
-    folders.py          where a bank lies, and which configuration it is of
+    files/              what a bank is on disk: arrays, records, table of contents, folders
     clip_jobs.py        which clips a configuration asks for
     clip_rendering.py   one clip from its seed
     build.py            all that are missing, by worker processes
-    opening.py          a bank by name or path
+    published.py        a bank on a place (`s3://...`): published there clip by clip, fetched
+    opening.py          a bank by name, path or URL
     bank.py             a bank that is open: its clips, splits and frames; one with every pixel
+    clip_arrays.py      its arrays on disk, opened as they are asked for
     thinned.py          one that has a pixel of each few, and what was made of its full frames
     compatibility.py    whether a sensor and a frame rate are those it was made for
     word_bank.py        one that has what a camera delivered, in place of light

@@ -12,13 +12,9 @@ from .build import (
     rendering_minutes as rendering_minutes,
 )
 from .compatibility import check_fits as check_fits, gray_differences as gray_differences
-from .folders import (
-    SHIPPED as SHIPPED,
-    bank_folder as bank_folder,
-    cache_dir as cache_dir,
-)
-from .layout import (
+from .files import (
     MANIFEST as MANIFEST,
+    SHIPPED as SHIPPED,
     THINNED_CONTENTS as THINNED_CONTENTS,
     BankError as BankError,
     ClipFacts as ClipFacts,
@@ -27,7 +23,14 @@ from .layout import (
     StoredNetwork as StoredNetwork,
     TableOfContents as TableOfContents,
     TruthLevel as TruthLevel,
+    bank_folder as bank_folder,
+    cache_dir as cache_dir,
+    cure_for as cure_for,
     frame_bytes as frame_bytes,
+    read_thinned_contents as read_thinned_contents,
+    sha256_of as sha256_of,
+    verify as verify,
+    write_recorded_contents as write_recorded_contents,
 )
 from .opening import find_thinned as find_thinned, open_bank as open_bank
 from .predictions import (
@@ -35,14 +38,15 @@ from .predictions import (
     PredictedDistances as PredictedDistances,
     keep_predictions as keep_predictions,
 )
-from .recorded_bank import RecordedBank as RecordedBank
-from .store import (
-    cure_for as cure_for,
-    read_thinned_contents as read_thinned_contents,
-    sha256_of as sha256_of,
-    verify as verify,
-    write_recorded_contents as write_recorded_contents,
+from .published import (
+    fetch_bank as fetch_bank,
+    finish_published as finish_published,
+    publish_bank as publish_bank,
+    publish_clip as publish_clip,
+    standing_clips as standing_clips,
+    verify_published as verify_published,
 )
+from .recorded_bank import RecordedBank as RecordedBank
 from .thinned import (
     FARTHEST_M as FARTHEST_M,
     LOG_AMBIENT as LOG_AMBIENT,

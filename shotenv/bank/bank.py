@@ -1,28 +1,30 @@
-"""A bank, open for reading, indexed by frame; and the one that has every pixel, memory-mapped."""
+"""A bank, open for reading, indexed by frame; and the one that has every pixel."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections import OrderedDict
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Lock
 from typing import Literal
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from shotenv.bank.layout import ARRAYS, BankError, Manifest, TableOfContents, TruthLevel
-from shotenv.bank.store import read_manifest
+from shotenv.bank.clip_arrays import ClipArrays, MappedClips, PackedClips
+from shotenv.bank.files import (
+    ARRAYS,
+    BankError,
+    Manifest,
+    TableOfContents,
+    TruthLevel,
+    read_manifest,
+)
 from shotenv.config import TRAINING_FAMILIES, Split
 from shotenv.sensor import Exposure
 from unwrap.signal import Shots
 from unwrap.training import RANDOM_SPLITS, random_split
-
-OPEN_CLIPS = 128
-"""Clips of a bank that are mapped at a time: with five arrays each, 640 of the usual 1024 files."""
 
 
 @dataclass(frozen=True)
@@ -61,47 +63,6 @@ class BankFrame:
     ego_speed_m_s: float
     yaw_rate_rad_s: float
     gray_exposure_s: float
-
-
-class MappedClips:
-    """Arrays of a bank's clips, memory-mapped when asked for; the longest unused are closed.
-
-    Every mapped array holds a file descriptor, and a bank may have more of them than a process may
-    open. Threads may share it.
-
-    Parameters
-    ----------
-    folders
-        Of the clips, in their order.
-    names
-        Of the arrays.
-    most
-        Clips mapped at a time.
-    """
-
-    def __init__(
-        self, folders: Sequence[Path], names: Collection[str] = ARRAYS, *, most: int = OPEN_CLIPS
-    ) -> None:
-        self._folders, self._names, self._most = tuple(folders), tuple(names), most
-        self._mapped: OrderedDict[int, dict[str, Tensor]] = OrderedDict()
-        self._lock = Lock()
-
-    def __getitem__(self, clip: int) -> dict[str, Tensor]:
-        """Arrays of clip number `clip` by name, frames first."""
-        with self._lock:
-            if clip not in self._mapped:
-                self._mapped[clip] = self._map(self._folders[clip])
-                if len(self._mapped) > self._most:
-                    self._mapped.popitem(last=False)
-            self._mapped.move_to_end(clip)  # The one unused for longest comes first.
-            return self._mapped[clip]
-
-    def _map(self, folder: Path) -> dict[str, Tensor]:
-        # Copy-on-write: torch wants a writable array, and the file is never written to.
-        arrays = {
-            n: np.load(folder / f"{n}.npy", mmap_mode="c", allow_pickle=False) for n in self._names
-        }
-        return {name: torch.from_numpy(array) for name, array in arrays.items()}
 
 
 class Bank(ABC):
@@ -271,12 +232,12 @@ class Bank(ABC):
     def _per_frame(self, field: str) -> np.ndarray:
         return np.concatenate([np.asarray(getattr(clip, field)) for clip in self.manifest.clips])
 
-    def _gathered(self, arrays: MappedClips, name: str, indices: Sequence[int]) -> Tensor:
-        """Array `name` of the frames `indices`, stacked; a single one is a view of the file."""
-        # Frame by frame: each lies in one piece in its clip's file, and only its pages are read.
+    def _gathered(self, arrays: ClipArrays, name: str, indices: Sequence[int]) -> Tensor:
+        """Array `name` of the frames `indices`, stacked; of a single one nothing is copied."""
+        # Frame by frame: each lies in one piece in its clip's file, and only that is read.
         clips = [int(self._clip_of_frame[index]) for index in indices]
         frames = [
-            arrays[clip][name].narrow(0, index - self.clips[clip].start, 1)
+            arrays.frame(clip, name, index - self.clips[clip].start)
             for clip, index in zip(clips, indices, strict=True)
         ]
         return frames[0] if len(frames) == 1 else torch.cat(frames)
@@ -288,13 +249,17 @@ class Bank(ABC):
 
 
 class RenderedBank(Bank):
-    """A bank that has every pixel, memory-mapped."""
+    """A bank that has every pixel, memory-mapped or packed: see `BankConfig.storage`."""
 
     manifest: Manifest
 
     def __init__(self, folder: Path) -> None:
         super().__init__(folder, read_manifest(Path(folder)))
-        self._arrays = MappedClips([self.folder / clip.folder for clip in self.manifest.clips])
+        folders = [self.folder / clip.folder for clip in self.manifest.clips]
+        if self.manifest.storage == "float32":
+            self._arrays: ClipArrays = MappedClips(folders)
+        else:
+            self._arrays = PackedClips(folders, (self.height, self.width))
 
     def exposure(self, indices: Tensor) -> Exposure:
         """See `Bank.exposure`."""

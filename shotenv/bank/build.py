@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 import shutil
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from filelock import FileLock
 
 from shotenv.bank.clip_jobs import ClipJob, clip_jobs
-from shotenv.bank.folders import SOURCE, bank_folder, identity, was_rendered_from
-from shotenv.bank.layout import CLIPS, MANIFEST, BankError, frame_bytes
-from shotenv.bank.store import read_clip_record, write_manifest
+from shotenv.bank.files import (
+    CLIPS,
+    MANIFEST,
+    SOURCE,
+    BankError,
+    ClipRecord,
+    bank_folder,
+    frame_bytes,
+    identity,
+    read_clip_record,
+    was_rendered_from,
+    write_manifest,
+)
 from shotenv.config import BankConfig
-from shotenv.render.backend import available_cores, require_device, run_jobs
+from shotenv.render.backend import RendererError, limit_threads, require_device
+from unwrap.execution import Executor, WorkerError, available_cores, run_tasks
 from unwrap.signal import Shots
 from unwrap.support import progress, say, write_json
 
@@ -25,12 +37,20 @@ of scenes that had to be built first."""
 FRAMES_PER_WORKER = 512
 """Rendered frames after which a worker process is replaced: rebuilding scenes leaks memory."""
 
+SEEN_S = 60.0
+"""After so long a file of another machine is seen by this one: NFS keeps for a minute what was
+not there."""
+
 DISK_MARGIN = 1.05
 """Free space asked for, over what the arrays take: records and file system want some, too."""
 
 
 def build_bank(
-    config: BankConfig, folder: Path | None = None, *, workers: int | None = None
+    config: BankConfig,
+    folder: Path | None = None,
+    *,
+    workers: int | None = None,
+    executor: Executor = "local",
 ) -> Path:
     """Render the bank of `config` and return its folder; clips that already stand are kept.
 
@@ -39,16 +59,21 @@ def build_bank(
     folder
         Where to; the user's cache folder by default.
     workers
-        Rendering processes; one per core by default.
+        Clips that are rendered at a time; one per core by default.
+    executor
+        "local", or "ray": on the machines of a cluster, which must all see `folder`. The bank is
+        the same.
 
     Raises
     ------
     BankError
         `folder` holds another bank, or the disk has no room.
-    shotenv.render.RendererError
-        No usable LLVM library or GPU, or a worker died.
+    RendererError
+        No usable LLVM library or GPU.
+    WorkerError
+        A clip failed, its worker died, or another machine does not see `folder`.
     """
-    folder = bank_folder(config) if folder is None else Path(folder)
+    folder = bank_folder(config) if folder is None else Path(folder).resolve()
     jobs = clip_jobs(config, folder)
     # Without the lock, which a folder that can only be read would not give.
     finished = (folder / MANIFEST).is_file() and was_rendered_from(folder, config)
@@ -66,11 +91,12 @@ def build_bank(
         # Only now, under the lock: another process may have rendered them meanwhile.
         missing = [job for job in jobs if read_clip_record(job.folder) is None]
         _announce(config, folder, len(jobs), missing)
-        _render(missing, config, workers or available_cores())
-        records = [read_clip_record(job.folder) for job in jobs]
+        _render(missing, workers, executor)
+        _delete_half_written(folder)
         size = (config.camera.height, config.camera.width)
-        standing = [record for record in records if record is not None]
-        write_manifest(folder, config.name, standing, size, config)
+        seen_s = SEEN_S if executor == "ray" else 0.0
+        records = [_record(job, seen_s) for job in jobs]
+        write_manifest(folder, config.name, records, size, config)
     return folder
 
 
@@ -82,11 +108,34 @@ def _claim(folder: Path, config: BankConfig) -> None:
         write_json(folder / SOURCE, identity(config))
     elif not was_rendered_from(folder, config):
         raise BankError(f"{folder} holds a bank of another configuration; choose another folder")
-    # What a killed rendering left half-written lies under hidden names.
+    _delete_half_written(folder)
+
+
+def _delete_half_written(folder: Path) -> None:
+    """Remove what a killed rendering, or a machine that died, has left under hidden names."""
     for leftover in (folder / CLIPS).glob(".*"):
         shutil.rmtree(leftover, ignore_errors=True)
     for leftover in folder.glob(".*.json.*"):
         leftover.unlink()
+
+
+def _record(job: ClipJob, seen_s: float) -> ClipRecord:
+    """Record of a clip that is rendered, which another machine's may be seen only after `seen_s`.
+
+    Raises
+    ------
+    WorkerError
+        It is not in this machine's folder.
+    """
+    end = time.monotonic() + seen_s
+    while (record := read_clip_record(job.folder)) is None:
+        if time.monotonic() > end:
+            raise WorkerError(
+                f"{job.name} was rendered, but is not in {job.folder.parent} of this machine; "
+                "expected a folder that all machines share"
+            )
+        time.sleep(0.5)
+    return record
 
 
 def _announce(config: BankConfig, folder: Path, clips: int, missing: Sequence[ClipJob]) -> None:
@@ -105,24 +154,34 @@ def _announce(config: BankConfig, folder: Path, clips: int, missing: Sequence[Cl
     )
 
 
-def _render(jobs: Sequence[ClipJob], config: BankConfig, workers: int) -> None:
+def _render(jobs: Sequence[ClipJob], workers: int | None, executor: Executor) -> None:
     if not jobs:
         return
-    require_device()
+    if executor == "local":
+        require_device()
     # Worlds and renderer want packages that those who only open a bank need not have.
-    from shotenv.bank.clip_rendering import render_clip
+    from shotenv.bank.clip_rendering import render_missing
 
     longest = max(job.frames for job in jobs)
     with progress(sum(job.frames for job in jobs), "rendering", "frame") as bar:
-        # A clip of more frames than that still has to be one worker's.
-        jobs_per_worker = max(1, FRAMES_PER_WORKER // longest)
-        for job, _ in run_jobs(render_clip, jobs, workers=workers, jobs_per_worker=jobs_per_worker):
+        done = run_tasks(
+            render_missing,
+            jobs,
+            executor=executor,
+            workers=workers,
+            # A clip of more frames than that still has to be one worker's.
+            tasks_per_worker=max(1, FRAMES_PER_WORKER // longest),
+            prepare=limit_threads,
+            passing=(BankError, RendererError, WorkerError),
+            name=lambda job: f"clip {job.name}",
+        )
+        for job, _ in done:
             bar.update(job.frames)
 
 
 def bank_bytes(config: BankConfig, frames: int) -> int:
     """Bytes on disk of `frames` frames."""
-    return frames * frame_bytes(config.camera.height, config.camera.width)
+    return frames * frame_bytes(config.camera.height, config.camera.width, config.storage)
 
 
 def rendering_minutes(config: BankConfig, frames: int) -> float:

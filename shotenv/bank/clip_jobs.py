@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from shotenv.bank.layout import CLIP_RECORD, CLIPS
+from shotenv.bank.files import CLIP_RECORD, CLIPS
 from shotenv.config import OWN, BankConfig, Family, MountConfig, Split
 
 

@@ -8,14 +8,14 @@ import numpy as np
 import torch
 
 from shotenv.bank.clip_jobs import ClipJob
-from shotenv.bank.layout import ARRAYS, BankError
-from shotenv.bank.store import write_clip
+from shotenv.bank.files import ARRAYS, BankError, write_clip
 from shotenv.config import BankConfig, Family
 from shotenv.render import FrameRenderer, RenderedFrame
 from shotenv.scenes import own_world, read_scene
 from shotenv.sensor import capture_gray, gray_exposure_s
 from shotenv.world import draw_world
 from shotenv.world.geometry import World, ground_speed_m_s, mounted, yaw_rate_rad_s
+from unwrap.execution import visible
 
 METER_REDUCTION = 4
 """The light meter sees one pixel where the camera sees so many each way; assumed."""
@@ -28,6 +28,19 @@ MOST_WORLDS = 64
 
 SEEDS_APART = 2**32
 """From the seed of one of them to the next: no other clip of any bank has seeds so far up."""
+
+
+def render_missing(job: ClipJob) -> None:
+    """In a worker: render a clip, unless the same task was begun before and came to its end.
+
+    Raises
+    ------
+    WorkerError
+        This machine does not see the bank's folder.
+    """
+    visible(job.folder.parent)
+    if not job.stands:
+        render_clip(job)
 
 
 def render_clip(job: ClipJob) -> str:
@@ -56,7 +69,8 @@ def render_clip(job: ClipJob) -> str:
         "yaw_rate_rad_s": [yaw_rate_rad_s(world.ego, time) for time in times],
         "gray_exposure_s": exposure_s.tolist(),
     }
-    write_clip(job.folder, {**light, "gray": gray.numpy().astype(np.uint16)}, metadata)
+    arrays = {**light, "gray": gray.numpy().astype(np.uint16)}
+    write_clip(job.folder, arrays, metadata, storage=config.storage)
     return job.name
 
 

@@ -6,21 +6,31 @@ from pathlib import Path
 
 from shotenv.bank.bank import Bank, RenderedBank
 from shotenv.bank.build import build_bank, clips_standing
-from shotenv.bank.folders import SHIPPED, bank_folder
-from shotenv.bank.layout import MANIFEST, RECORDED_CONTENTS, THINNED_CONTENTS, BankError
+from shotenv.bank.files import (
+    MANIFEST,
+    RECORDED_CONTENTS,
+    SHIPPED,
+    THINNED_CONTENTS,
+    BankError,
+    bank_folder,
+)
+from shotenv.bank.published import fetch_bank
 from shotenv.bank.recorded_bank import RecordedBank
 from shotenv.bank.thinned import ThinnedBank
 from shotenv.config import BankConfig, ConfigError, find_config, read_config
+from unwrap.storage import is_url
 
 
 def find_thinned(bank: str | Path) -> ThinnedBank | None:
-    """The thinned bank of that path or name, or None where there is no such one.
+    """The thinned bank of that path, URL or name, or None where there is no such one.
 
     Raises
     ------
     BankError
         It is damaged.
     """
+    if is_url(bank):
+        bank = fetch_bank(str(bank))
     # A name is one part: SHIPPED / "/somewhere" would be somewhere.
     folders = [Path(bank), *([SHIPPED / bank] if Path(bank).name == str(bank) else [])]
     for folder in folders:
@@ -38,8 +48,9 @@ def open_bank(bank: str | Path, *, render: bool = True) -> Bank:
     Parameters
     ----------
     bank
-        A folder that holds a bank; the name of one that comes with the package (`SHIPPED`); or a
-        configuration: a name in `configs/bank/` or the path of a YAML file.
+        A folder that holds a bank; the URL of a place where one was published, which is fetched
+        into the cache folder on first use; the name of one that comes with the package
+        (`SHIPPED`); or a configuration: a name in `configs/bank/` or the path of a YAML file.
     render
         Render a configured bank first where it does not stand yet; otherwise it is an error.
 
@@ -47,7 +58,11 @@ def open_bank(bank: str | Path, *, render: bool = True) -> Bank:
     ------
     BankError
         Neither a bank nor a configuration, or a damaged bank; the message names file and cure.
+    unwrap.storage.StorageError
+        The place cannot be read, or what lies there is damaged.
     """
+    if is_url(bank):
+        bank = fetch_bank(str(bank))
     # A folder first: who names a path means what lies there, not a configuration of that name.
     if (Path(bank) / MANIFEST).is_file():
         return RenderedBank(Path(bank))

@@ -19,8 +19,7 @@ import torch
 from torch import Tensor
 
 from shotenv.bank.bank import Bank, require_full
-from shotenv.bank.folders import cache_dir
-from shotenv.bank.store import sha256_of, write_array
+from shotenv.bank.files import cache_dir, sha256_of, write_array
 from unwrap.networks import Prediction, Unwrapper
 from unwrap.support import progress, read_json, write_json
 

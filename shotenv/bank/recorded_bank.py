@@ -7,9 +7,9 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from shotenv.bank.bank import Clip, MappedClips
-from shotenv.bank.layout import RecordedContents, TruthLevel
-from shotenv.bank.store import read_recorded_contents
+from shotenv.bank.bank import Clip
+from shotenv.bank.clip_arrays import MappedClips
+from shotenv.bank.files import RecordedContents, TruthLevel, read_recorded_contents
 from shotenv.bank.word_bank import ClipSettings, WordBank
 from unwrap.signal import RawFrame, Shots
 

@@ -27,15 +27,18 @@ import torch
 from torch import Tensor
 
 from shotenv.bank.bank import Bank
-from shotenv.bank.layout import (
+from shotenv.bank.files import (
     THINNED_ARRAYS,
     THINNED_FILE,
     BankError,
     StoredNetwork,
     ThinnedContents,
+    cure_for,
+    read_thinned_contents,
+    sha256_of,
+    write_thinned_contents,
 )
 from shotenv.bank.predictions import PredictedDistances
-from shotenv.bank.store import cure_for, read_thinned_contents, sha256_of, write_thinned_contents
 from shotenv.sensor import Exposure
 from unwrap.networks import WeightsLabel
 from unwrap.support import write_bytes

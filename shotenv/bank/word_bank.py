@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from shotenv.bank.bank import Bank, Clip
-from shotenv.bank.layout import BankError, TruthLevel
+from shotenv.bank.files import BankError, TruthLevel
 from shotenv.sensor import Exposure
 from unwrap.signal import RawFrame, Shots
 

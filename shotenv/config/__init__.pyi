@@ -3,6 +3,7 @@ from .bank import (
     MOST_FRAMES as MOST_FRAMES,
     BankConfig as BankConfig,
     CameraConfig as CameraConfig,
+    Storage as Storage,
     WorldConfig as WorldConfig,
 )
 from .emission import EmissionConfig as EmissionConfig

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 from pydantic import Field, model_validator
 
@@ -24,6 +25,8 @@ HIGHEST_SPEED_M_S = 60.0
 
 MOST_FRAMES, MOST_CLIPS = 4096, 10**6
 """Of one clip; of a split and family (assumed: more would not fit on any disk)."""
+
+Storage = Literal["float32", "float16"]
 
 
 class CameraConfig(Section):
@@ -111,6 +114,10 @@ class BankConfig(Section):
         ge=0,
         le=MOST_CLIPS,
         description="further training clips, of the family for training only",
+    )
+    storage: Storage = Field(
+        "float32",
+        description="arrays on disk: float32, mapped into memory; or float16, compressed",
     )
     own_scene: OwnSceneConfig | None = Field(
         None, description="scene of a file in place of drawn ones; `--scene` makes it"

@@ -40,7 +40,7 @@ ACQUISITION_FIELDS = frozenset(
 """Fields that are applied when a frame is acquired and corrected: a bank serves all their values.
 
 All others are baked into the light and the gray images of a bank. They are part of its identity
-(`shotenv.bank.folders`), and a bank that was made with another value is refused
+(`shotenv.bank.files.folders`), and a bank that was made with another value is refused
 (`shotenv.bank.check_fits`). A new field counts as baked until it is named here.
 """
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
+
+import numpy as np
 
 from shotenv.config import LaserConfig
 
@@ -25,20 +26,23 @@ def ageing_rate(electrical_power_w: Array, temperature_k: Array, laser: LaserCon
     temperature_k : [B]
         Of the junction.
     """
-    return _current(electrical_power_w, laser) * _arrhenius(temperature_k, laser)
+    exponent = 0.0
+    if laser.ageing_exponent:
+        # What the rated current takes: the light's power at 25 C over the efficiency there.
+        rated_w = laser.rated_power_w / laser.efficiency
+        exponent = laser.ageing_exponent * _log(electrical_power_w / rated_w)
+    if laser.activation_energy_ev:
+        activation_k = laser.activation_energy_ev / BOLTZMANN_EV_PER_K
+        exponent = exponent + activation_k / laser.rated_k - activation_k / temperature_k
+    return _exp(exponent)
 
 
-def _current(electrical_power_w: Array, laser: LaserConfig) -> Array:
-    if not laser.ageing_exponent:
-        return 1.0
-    # What the rated current takes: the light's power at 25 C over the efficiency there.
-    rated_w = laser.rated_power_w / laser.efficiency
-    return (electrical_power_w / rated_w) ** laser.ageing_exponent
+# Not `**`: torch rounds the last elements of a batch otherwise than those before, and what a drive
+# wears would depend on how many are played beside it. NumPy and torch have these functions each for
+# their own arrays alone.
+def _log(values: Array) -> Array:
+    return values.log() if hasattr(values, "log") else np.log(values)
 
 
-def _arrhenius(temperature_k: Array, laser: LaserConfig) -> Array:
-    if not laser.activation_energy_ev:
-        return 1.0
-    activation_k = laser.activation_energy_ev / BOLTZMANN_EV_PER_K
-    # Not `exp`, which NumPy and torch each have for their own arrays alone.
-    return math.e ** (activation_k / laser.rated_k - activation_k / temperature_k)
+def _exp(values: Array) -> Array:
+    return values.exp() if hasattr(values, "exp") else np.exp(values)

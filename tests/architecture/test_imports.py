@@ -26,6 +26,8 @@ def room(name: str, *imports: str) -> None:
 SIGNAL = ("unwrap.support", "unwrap.signal")
 UNWRAPPING = (*SIGNAL, "unwrap.depth", "unwrap.networks")
 room("unwrap.support")
+room("unwrap.storage", "unwrap.support")
+room("unwrap.execution", "unwrap.support")
 room("unwrap.pictures")
 room("unwrap.signal", "unwrap.support")
 room("unwrap.depth", *SIGNAL)
@@ -52,7 +54,7 @@ room(
     "unwrap.cameras",
 )
 room("unwrap.export", *UNWRAPPING, "unwrap.training")
-room("unwrap.comparison", *UNWRAPPING, "unwrap.training", "unwrap.pictures")
+room("unwrap.comparison", *UNWRAPPING, "unwrap.execution", "unwrap.training", "unwrap.pictures")
 room("unwrap", *UNWRAPPING)
 
 LIGHT = ("shotenv.config", "shotenv.world.geometry", "shotenv.world")
@@ -74,7 +76,7 @@ room(
     "shotenv.world.geometry",
     "shotenv.world.families",
 )
-room("shotenv.render.backend", "unwrap.support")
+room("shotenv.render.backend")
 room(
     "shotenv.render.surfaces", "unwrap.support", "shotenv.world.geometry", "shotenv.render.backend"
 )
@@ -95,9 +97,11 @@ room(
 )
 room("shotenv.sensor", *SIGNAL, "shotenv.config")
 room("shotenv.laser", "shotenv.config")
+room("shotenv.bank.files", "unwrap.support", "shotenv.config")
 room(
     "shotenv.bank",
     *UNWRAPPING,
+    "unwrap.execution",
     "unwrap.training",
     "unwrap.pictures",
     *LIGHT,
@@ -105,6 +109,8 @@ room(
     "shotenv.render.backend",
     "shotenv.scenes",
     "shotenv.sensor",
+    "shotenv.bank.files",
+    "unwrap.storage",
 )
 room(
     "shotenv.bank.listing",
@@ -146,10 +152,11 @@ room("agents.policies", *SIGNAL, *ENVIRONMENT, "agents.config")
 room("agents.optimum", *SIGNAL, *ENVIRONMENT, "agents.policies")
 PLAYING = (*SIGNAL, *ENVIRONMENT, "agents.config", "agents.policies", "agents.optimum")
 room("agents.evaluation", *PLAYING)
-room("agents.training", *PLAYING, "agents.evaluation")
+room("agents.training", *PLAYING, "unwrap.execution", "agents.evaluation")
 room(
     "agents.study",
     *PLAYING,
+    "unwrap.execution",
     "agents.evaluation",
     "agents.training",
 )
@@ -167,6 +174,7 @@ room("agents", "agents.policies", "agents.evaluation", "agents.training")
 room(
     "agents.cli.command",
     "unwrap.support",
+    "unwrap.execution",
     "unwrap.depth",
     "shotenv.config",
     "shotenv.decision",
@@ -183,6 +191,7 @@ ONLY_IN = {
     "sb3_contrib": "agents/training/",
     "lightning": "unwrap/training/",
     "numba": "unwrap/support/compiled.py",
+    "ray": "unwrap/execution/",
     "plotly": "agents/report/",
     "pygame": "shotenv/env/",
     "mcap": "unwrap/ros/",
@@ -193,6 +202,8 @@ ONLY_IN = {
     "onnx": ("unwrap/export/", "agents/deploy/"),
     "onnxruntime": ("unwrap/export/", "agents/deploy/"),
     "openvino": "unwrap/networks/",
+    "fsspec": "unwrap/storage/",
+    "backports": "shotenv/bank/files/",
     "h5py": ("unwrap/cameras/files/", "unwrap/cameras/writing/"),
 }
 SOURCES = sorted(

@@ -12,7 +12,7 @@ import yaml
 from torch import Tensor
 
 from shotenv.bank.bank import Clip
-from shotenv.bank.layout import ClipFacts, TableOfContents
+from shotenv.bank.files.layout import ClipFacts, TableOfContents
 from shotenv.bank.word_bank import ClipSettings, TruthLevel, WordBank
 from shotenv.decision.acquire import acquire_depths
 from shotenv.decision.problem import Problem, problem_of

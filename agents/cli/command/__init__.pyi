@@ -5,10 +5,12 @@ from .command import (
     WRONG_USAGE as WRONG_USAGE,
     Command as Command,
     add_config as add_config,
+    add_executor as add_executor,
     add_json as add_json,
     add_out as add_out,
     add_sensor_and_merge as add_sensor_and_merge,
     add_trust as add_trust,
+    execution_of as execution_of,
     section_of as section_of,
     write_numbers as write_numbers,
 )

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from jsonargparse import ArgumentParser, Namespace
+from jsonargparse.typing import PositiveInt
 from pydantic import BaseModel
 
 from shotenv.config import configs_dir
@@ -55,6 +56,26 @@ def add_config(parser: ArgumentParser, section: type[Section], default: str) -> 
     parser.default_config_files = [str(configs_dir() / default)]
     parser.add_argument("--config", action="config", help="YAML file over the defaults")
     parser.add_class_arguments(section, None, sub_configs=True)
+
+
+def add_executor(parser: ArgumentParser, tasks: str) -> None:
+    """`--executor` and `--workers`, see `execution_of`."""
+    from unwrap.execution import Executor
+
+    parser.add_argument(
+        "--executor",
+        type=Executor,
+        default="local",
+        help="local: processes of this machine; ray: the cluster that RAY_ADDRESS names",
+    )
+    parser.add_argument(
+        "--workers", type=PositiveInt, metavar="N", help=f"{tasks} at a time; one per core"
+    )
+
+
+def execution_of(arguments: Namespace) -> dict[str, Any]:
+    """What `add_executor` asked for, as keyword arguments."""
+    return {name: arguments[name] for name in ("executor", "workers")}
 
 
 def add_json(parser: ArgumentParser) -> None:

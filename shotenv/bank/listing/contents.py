@@ -11,6 +11,7 @@ from shotenv.bank import (
     THINNED_CONTENTS,
     Bank,
     RecordedBank,
+    RenderedBank,
     ThinnedBank,
     bank_bytes,
     bank_folder,
@@ -117,7 +118,8 @@ def contents_of(bank: Bank) -> dict[str, Any]:
 
 
 def _bytes_of(bank: Bank) -> int:
-    if isinstance(bank, ThinnedBank | RecordedBank):
+    # What is packed is as large as it came out.
+    if not isinstance(bank, RenderedBank) or bank.manifest.storage == "float16":
         return _bytes_in(bank.folder)
     # Without headers and records, which are less than a thousandth of it.
     return len(bank) * frame_bytes(bank.height, bank.width)

@@ -1,4 +1,4 @@
-"""What rendering runs on: the LLVM library, the device, worker processes."""
+"""What rendering runs on: the LLVM library and the device."""
 
 import lazy_loader
 

@@ -4,8 +4,8 @@ from .llvm import (
     OLDEST_LLVM as OLDEST_LLVM,
     RendererError as RendererError,
     find_llvm as find_llvm,
+    limit_threads as limit_threads,
     require_device as require_device,
     require_llvm as require_llvm,
     start_mitsuba as start_mitsuba,
 )
-from .workers import available_cores as available_cores, run_jobs as run_jobs

@@ -155,6 +155,15 @@ def start_mitsuba(variant: str | None = None) -> Any:
     return mitsuba
 
 
+def limit_threads(threads: int) -> None:
+    """Let kernels of this process run on so many threads."""
+    try:
+        import drjit
+    except ImportError:
+        return  # The first job that renders says so in a better way.
+    drjit.set_thread_count(threads)
+
+
 def _candidates() -> Iterator[str]:
     yield from re.findall(r"=> (\S*libLLVM\S*)", _ldconfig())
     for pattern in _FOLDERS:

@@ -43,7 +43,7 @@ def test_every_command_explains_itself(capsys, command):
     assert status == 0 and f"shotenv {command.words}" in out
 
 
-RESUMING = {"demo", "train", "study", "render", "unwrap train", "unwrap table"}
+RESUMING = {"demo", "train", "study", "render", "bank publish", "unwrap train", "unwrap table"}
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.words)
@@ -210,6 +210,20 @@ def test_a_damaged_bank_is_told_from_a_good_one(capsys, tmp_path, tiny_bank):
     path.write_bytes(bytes(content))
     status, _, err = run(capsys, "bank", "verify", tmp_path / "bank")
     assert status == 1 and str(path) in err
+
+
+def test_a_bank_is_published_opened_and_verified_by_url(capsys, tmp_path, tiny_bank):
+    url = f"file://{tmp_path}/place"
+    assert run(capsys, "bank", "publish", tiny_bank, "--to", url)[0] == 0
+    status, out, _ = run(capsys, "bank", "info", url)
+    assert status == 0 and "64 frames of 32 x 24 pixels" in out
+    assert run(capsys, "bank", "verify", url)[0] == 0
+    path = next((tmp_path / "place" / "objects").iterdir())
+    path.write_bytes(path.read_bytes()[:-1])
+    status, _, err = run(capsys, "bank", "verify", url)
+    assert status == 1 and f"objects/{path.name}" in err and "publish the bank again" in err
+    status, _, err = run(capsys, "bank", "info", f"file://{tmp_path}/nothing")
+    assert status == 1 and "holds no contents.json" in err and "Traceback" not in err
 
 
 def test_report_is_written_anew(capsys, tmp_path):

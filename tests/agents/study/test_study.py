@@ -160,9 +160,10 @@ def test_a_preset_may_have_some_of_the_policies_alone(files):
 
 def run_here(jobs, folder):
     """Every job, in this process."""
+    folder.mkdir(exist_ok=True)
     banks = job_runs.banks_of(jobs)
     for job in jobs:
-        job_runs.run_job(job, folder, job.depends_on(banks))
+        job_runs.run_job(job_runs.JobTask(job, folder, job.depends_on(banks)))
 
 
 @pytest.fixture
@@ -287,12 +288,12 @@ def test_a_learner_with_a_memory_is_a_job_like_the_others(files):
 
 
 def test_ctrl_c_says_what_is_kept(files, monkeypatch):
-    def interrupted(*_):
+    def interrupted(*_, **__):
         raise KeyboardInterrupt
 
     jobs = jobs_of(plan_of(files, policies=["random"], ablations={}, seeds=[0]))
     run_here(jobs[:1], files / "out")
-    monkeypatch.setattr(job_runs, "as_completed", interrupted)
+    monkeypatch.setattr(job_runs, "run_tasks", interrupted)
     with pytest.raises(KeyboardInterrupt, match="1 of 2 jobs are kept; the same command continues"):
         job_runs.run_jobs(jobs, files / "out", workers=1)
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import torch
 
-from shotenv.bank.bank import MappedClips
-from shotenv.bank.layout import ARRAYS, BankError, frame_bytes
+from shotenv.bank.clip_arrays import MappedClips
+from shotenv.bank.files.layout import ARRAYS, BankError, frame_bytes
+from shotenv.bank.files.store import read_clip_record, verify, write_clip, write_manifest
 from shotenv.bank.opening import open_bank
-from shotenv.bank.store import read_clip_record, verify, write_clip, write_manifest
 
 FRAMES, HEIGHT, WIDTH = 3, 6, 8
 
@@ -305,7 +305,7 @@ def test_full_disk_leaves_nothing_behind(tmp_path, monkeypatch):
     def no_space(descriptor):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("shotenv.bank.store.os.fsync", no_space)
+    monkeypatch.setattr("shotenv.bank.files.store.os.fsync", no_space)
     with pytest.raises(BankError, match="No space left"):
         write_clip(tmp_path / "clips" / "c", clip_arrays(0), clip_metadata("c", 0))
     assert not list(tmp_path.rglob("*.npy"))

@@ -11,8 +11,8 @@ from PIL import Image
 
 from agents.cli.entry import main
 from shotenv.bank.clip_jobs import clip_jobs
-from shotenv.bank.folders import bank_folder
-from shotenv.bank.layout import BankError
+from shotenv.bank.files.folders import bank_folder
+from shotenv.bank.files.layout import BankError
 from shotenv.bank.listing.contact_sheets import (
     clips_by_family,
     clips_shown,

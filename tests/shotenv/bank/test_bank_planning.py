@@ -9,11 +9,12 @@ import pytest
 from shotenv.bank import build as build_module
 from shotenv.bank.build import build_bank
 from shotenv.bank.clip_jobs import clip_jobs
-from shotenv.bank.folders import bank_folder as bank_folder_of
-from shotenv.bank.layout import BankError
+from shotenv.bank.files.folders import bank_folder as bank_folder_of
+from shotenv.bank.files.layout import BankError
 from shotenv.config.bank import BankConfig
 from shotenv.config.families import FAMILIES, SHIFT_FAMILIES
 from shotenv.config.reader import ConfigError, find_config, merged, read_config
+from unwrap.execution import WorkerError
 
 COUNTS = ("train_clips", "validation_clips", "test_clips", "shift_clips", "clutter_clips")
 
@@ -140,8 +141,8 @@ def test_no_room_on_the_disk_is_said_before_rendering(config, tmp_path, monkeypa
 
 
 def test_folder_of_another_configuration_is_left_alone(config, tmp_path, monkeypatch):
-    monkeypatch.setattr(build_module, "_render", lambda jobs, config, workers: None)
-    with pytest.raises(ValueError, match="clips"):
+    monkeypatch.setattr(build_module, "_render", lambda *_: None)
+    with pytest.raises(WorkerError, match="clips of this machine; expected a folder that all"):
         build_bank(config, tmp_path)
     other = merged(config, {"seed": 7})
     with pytest.raises(BankError, match="another configuration"):

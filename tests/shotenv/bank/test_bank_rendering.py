@@ -17,9 +17,9 @@ from shotenv.bank import build as build_module
 from shotenv.bank.build import build_bank
 from shotenv.bank.clip_jobs import clip_jobs
 from shotenv.bank.clip_rendering import render_clip
-from shotenv.bank.layout import BankError
+from shotenv.bank.files.layout import BankError
+from shotenv.bank.files.store import read_manifest, verify
 from shotenv.bank.opening import open_bank
-from shotenv.bank.store import read_manifest, verify
 from shotenv.config.bank import BankConfig
 from shotenv.config.reader import find_config, merged, read_config
 from shotenv.config.sensor import SensorConfig

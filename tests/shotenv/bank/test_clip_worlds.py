@@ -8,7 +8,7 @@ import pytest
 from shotenv.bank import clip_rendering
 from shotenv.bank.clip_jobs import clip_jobs
 from shotenv.bank.clip_rendering import SEEDS_APART, mean_speed_m_s, world_of
-from shotenv.bank.layout import BankError
+from shotenv.bank.files.layout import BankError
 from shotenv.config.bank import BankConfig
 from shotenv.config.families import SHIFT_FAMILIES
 from shotenv.config.reader import find_config, merged, read_config

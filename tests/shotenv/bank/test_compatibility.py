@@ -13,7 +13,7 @@ import torch
 import shotenv  # noqa: F401  registers the environments
 from agents.cli.entry import main
 from shotenv.bank.compatibility import BAKED_FIELDS, check_fits
-from shotenv.bank.folders import bank_folder
+from shotenv.bank.files.folders import bank_folder
 from shotenv.bank.opening import open_bank
 from shotenv.config.bank import BankConfig, CameraConfig, WorldConfig
 from shotenv.config.laser import LaserConfig

@@ -14,9 +14,9 @@ import torch
 
 from agents.cli.entry import main
 from shotenv.bank import thinned as thinned_file
-from shotenv.bank.layout import BankError
+from shotenv.bank.files.layout import BankError
+from shotenv.bank.files.store import verify
 from shotenv.bank.opening import open_bank
-from shotenv.bank.store import verify
 from shotenv.bank.thinned import FARTHEST_M, ThinnedBank, decode_light, encode_light
 from shotenv.config.keywords import env_config
 from shotenv.dataset.thinning import draw_positions

@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from shotenv.bank.bank import require_full
-from shotenv.bank.layout import BankError
+from shotenv.bank.files.layout import BankError
 from shotenv.bank.listing.contact_sheets import contact_sheet
 from shotenv.bank.predictions import keep_predictions
 from shotenv.bank.thinned import ThinnedBank

@@ -3,8 +3,8 @@
 import pytest
 import torch
 
+from shotenv.bank.files.store import BankError
 from shotenv.bank.opening import open_bank
-from shotenv.bank.store import BankError
 from shotenv.config.keywords import env_config
 from shotenv.dataset.export_inputs import bank_export_frames, choose_check_bank
 from unwrap.signal.shots import Shots

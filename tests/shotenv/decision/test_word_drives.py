@@ -8,7 +8,7 @@ import pytest
 import torch
 from word_banks import HeldWords, replayed_problem
 
-from shotenv.bank.layout import BankError
+from shotenv.bank.files.layout import BankError
 from shotenv.decision.acquire import acquire_depths
 from shotenv.decision.drive import DriveOptions
 from shotenv.decision.measurement_cache import MeasurementCache

@@ -233,6 +233,19 @@ def test_ten_kelvin_age_by_the_published_factor(detailed, energy_ev, factor, as_
     assert float(rate[1] / rate[0]) == pytest.approx(factor, rel=1e-4)
 
 
+@pytest.mark.parametrize("size", [1, 7, 64])
+def test_wear_does_not_depend_on_the_batch(detailed, size):
+    random = torch.Generator().manual_seed(0)
+    power_w, warmer = torch.rand(2, 2000, dtype=torch.float64, generator=random)
+    temperature_k = 280.0 + 80.0 * warmer
+    whole = ageing_rate(1.0 + power_w, temperature_k, detailed)
+    parts = [
+        ageing_rate(*both, detailed)
+        for both in zip((1.0 + power_w).split(size), temperature_k.split(size), strict=True)
+    ]
+    assert torch.equal(torch.cat(parts), whole)
+
+
 def test_rated_conditions_use_one_hour_in_an_hour(detailed):
     rated = kelvin(detailed.rated_power_w / detailed.efficiency)
     assert ageing_rate(rated, kelvin(detailed.rated_k), detailed).item() == pytest.approx(1.0)

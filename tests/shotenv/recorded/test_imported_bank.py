@@ -12,9 +12,9 @@ import torch
 from PIL import Image
 
 from agents.cli.entry import main
-from shotenv.bank.layout import BankError
+from shotenv.bank.files.layout import BankError
+from shotenv.bank.files.store import verify
 from shotenv.bank.opening import open_bank
-from shotenv.bank.store import verify
 from shotenv.config.keywords import env_config
 from shotenv.decision.problem import open_problem
 from shotenv.decision.transition import reset, step

@@ -1,25 +1,18 @@
-"""The renderer as software: repeatable, one kernel, clear errors, workers that never linger."""
+"""The renderer as software: repeatable, one kernel, clear errors."""
 
 from __future__ import annotations
 
-import multiprocessing
 import os
-import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-import render_jobs
-import torch_jobs
 from render_worlds import DARK, SMALL, floor, mesh, square, wall, world
 
-from shotenv.render.backend import llvm, workers
+from shotenv.render.backend import llvm
 from shotenv.render.backend.llvm import RendererError, find_llvm
-from shotenv.render.backend.workers import run_jobs
 from shotenv.render.frame import render_frame
 from shotenv.render.instants import frame_instants
 from shotenv.render.surfaces.geometry import REACH_M, faces_of, posed, tile_grid
@@ -167,11 +160,17 @@ def test_the_texture_is_full_and_has_no_seam():
     assert np.abs(noise[:, 0] - noise[:, -1]).mean() < 1.5 * inside
 
 
+def test_a_world_without_anything_that_moves_has_a_face_to_pad_with():
+    assert len(faces_of(corner()).thing) == 1
+    moving = replace(corner(), moving=(MovingObject(mesh(wall(3.0)), Arc(Pose((0, 0, 0)))),))
+    assert len(faces_of(moving).thing) == 2
+
+
 # --- LLVM
 
 
 def test_importing_the_renderer_loads_no_mitsuba():
-    code = "import sys, shotenv.render.backend.workers; sys.exit('mitsuba' in sys.modules)"
+    code = "import sys, shotenv.render.backend; sys.exit('mitsuba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
 
 
@@ -249,95 +248,3 @@ def test_rendering_on_a_gpu_needs_no_llvm(no_library_named):
     no_library_named.setenv(llvm.VARIANT_VARIABLE, "cuda_ad_mono")
     no_library_named.setattr(llvm, "_candidates", lambda: iter(()))
     llvm.require_device()
-
-
-# --- workers
-
-
-def test_jobs_come_back_with_their_results_from_replaced_workers():
-    done = dict(run_jobs(render_jobs.squared, range(3), workers=1, jobs_per_worker=2))
-    assert {job: square for job, (square, _) in done.items()} == {i: i * i for i in range(3)}
-    assert len({pid for _, pid in done.values()}) == 2
-    assert not multiprocessing.active_children()
-
-
-@pytest.mark.slow
-def test_workers_share_the_cores_with_torch_too():
-    share = max(1, workers.available_cores() // 2)
-    assert dict(run_jobs(torch_jobs.threads, [0], workers=2)) == {0: share}
-
-
-def test_workers_share_the_cores_with_numpy_too():
-    share = max(1, workers.available_cores() // 2)
-    assert dict(run_jobs(render_jobs.blas_threads, [0], workers=2)) == {0: {share}}
-
-
-def test_leaving_the_loop_ends_the_workers():
-    for _ in run_jobs(render_jobs.squared, iter(int, 1), workers=2):
-        break
-    assert not multiprocessing.active_children()
-
-
-@pytest.mark.parametrize(
-    ("function", "message"),
-    [
-        (render_jobs.fail_at_three, "job 3 failed: KeyError: 'no such lamp'"),
-        (render_jobs.killed_at_three, r"job 3 failed: its worker process \d+ died \(SIGKILL\)"),
-        (render_jobs.stopped_at_three, r"job 3 hangs: worker \d+ was stopped"),
-        (render_jobs.unpicklable_at_three, "job 3 failed: .*pickle"),
-    ],
-)
-def test_a_failing_job_is_named_within_ten_seconds(function, message, monkeypatch):
-    monkeypatch.setattr(workers, "STOPPED_LIMIT_S", 1.0)
-    results = run_jobs(function, [1, 3], workers=1)
-    assert next(results) == (1, 1)
-    start = time.monotonic()
-    with pytest.raises(RendererError, match=message):
-        next(results)
-    assert time.monotonic() - start < 10
-    assert not multiprocessing.active_children()
-
-
-@pytest.mark.parametrize("name", ["workers", "jobs_per_worker"])
-def test_counts_of_workers_are_checked(name):
-    counts = {"workers": 1, "jobs_per_worker": 1, name: 0}
-    with pytest.raises(ValueError, match=f"{name} is 0; expected at least 1"):
-        list(run_jobs(render_jobs.squared, [1], **counts))
-
-
-@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGKILL])
-def test_no_worker_outlives_its_parent(ending, tmp_path):
-    script = Path(render_jobs.__file__)
-    parent = subprocess.Popen(
-        [sys.executable, str(script), str(tmp_path)],
-        start_new_session=True,
-        stderr=subprocess.DEVNULL,
-    )
-    wait_until(lambda: len(list(tmp_path.iterdir())) == 2)
-    if ending == signal.SIGINT:
-        os.killpg(parent.pid, ending)
-    else:
-        parent.send_signal(ending)
-    parent.wait(timeout=10)
-    wait_until(lambda: not any(is_alive(int(path.name)) for path in tmp_path.iterdir()))
-
-
-def wait_until(condition, seconds: float = 30.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.05)
-
-
-def is_alive(pid: int) -> bool:
-    try:
-        status = Path(f"/proc/{pid}/stat").read_text()
-    except OSError:
-        return False
-    return status.rpartition(")")[2].split()[0] != "Z"
-
-
-def test_a_world_without_anything_that_moves_has_a_face_to_pad_with():
-    assert len(faces_of(corner()).thing) == 1
-    moving = replace(corner(), moving=(MovingObject(mesh(wall(3.0)), Arc(Pose((0, 0, 0)))),))
-    assert len(faces_of(moving).thing) == 2

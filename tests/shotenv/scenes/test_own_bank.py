@@ -18,11 +18,11 @@ from scene_files import write_obj
 from agents.cli import main
 from shotenv.bank.clip_jobs import clip_jobs
 from shotenv.bank.clip_rendering import world_of
-from shotenv.bank.folders import bank_folder, identity
-from shotenv.bank.layout import BankError
+from shotenv.bank.files.folders import bank_folder, identity
+from shotenv.bank.files.layout import BankError
+from shotenv.bank.files.store import verify
 from shotenv.bank.listing.contact_sheets import contact_sheet
 from shotenv.bank.opening import open_bank
-from shotenv.bank.store import verify
 from shotenv.config.bank import BankConfig, WorldConfig
 from shotenv.config.own_scene import MaterialsConfig, ScenePathConfig
 from shotenv.scenes.bank_config import own_bank

@@ -1,4 +1,4 @@
-"""A job that computes with torch; worker processes import it by name."""
+"""A task that computes with torch; worker processes import it by name."""
 
 from __future__ import annotations
 

@@ -4,7 +4,8 @@ A rendered bank:
 
 <bank>/manifest.json            written last: schema, configuration, one record per clip
 <bank>/clips/<clip>/clip.json   the clip's own record, with a sha256 per array file
-<bank>/clips/<clip>/*.npy       one array per quantity, frames first (see `ARRAYS`)
+<bank>/clips/<clip>/*.npy       one array per quantity, frames first (see `ARRAYS`); or
+<bank>/clips/<clip>/*.zst       the same packed, where `storage` is float16 (see `packed.py`)
 
 A thinned bank, one pixel of each few:
 
@@ -28,12 +29,16 @@ from typing import Final, Literal, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from shotenv.config import BankConfig, SensorConfig, Split
+from shotenv.config import BankConfig, SensorConfig, Split, Storage
 
 SCHEMA_VERSION: Final = 1
 MANIFEST, CLIPS, CLIP_RECORD = "manifest.json", "clips", "clip.json"
 THINNED_CONTENTS, THINNED_FILE = "thinned.json", "arrays.npz"
 RECORDED_CONTENTS = "recorded.json"
+PACKED_SUFFIX = ".zst"
+
+PACKED_SHARE = 0.4
+"""Of the bytes, that packed arrays take: measured .37 (docs/scale.md), and a margin."""
 
 TruthLevel = Literal["external", "own", "none"]
 """What distances are scored against: a reference; the depth of a camera's own eight samples where
@@ -137,6 +142,11 @@ class Manifest(TableOfContents):
 
     units: dict[str, str]
     clips: tuple[ClipRecord, ...] = Field(min_length=1)
+
+    @property
+    def storage(self) -> Storage:
+        """How its arrays are stored; see `BankConfig.storage`."""
+        return "float32" if self.config is None else self.config.storage
 
     @property
     def fingerprint(self) -> str:
@@ -262,6 +272,12 @@ class RecordedContents(TableOfContents):
         return self
 
 
-def frame_bytes(height: int, width: int) -> int:
-    """Bytes that one frame takes on disk."""
-    return sum(spec.frame_bytes(height, width) for spec in ARRAYS.values())
+def array_file(name: str, storage: Storage) -> str:
+    """Name of the file of array `name` in a clip's folder."""
+    return f"{name}{PACKED_SUFFIX if storage == 'float16' else '.npy'}"
+
+
+def frame_bytes(height: int, width: int, storage: Storage = "float32") -> int:
+    """Bytes that one frame takes on disk; packed, about so many."""
+    mapped = sum(spec.frame_bytes(height, width) for spec in ARRAYS.values())
+    return mapped if storage == "float32" else round(PACKED_SHARE * mapped)

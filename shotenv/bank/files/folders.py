@@ -16,7 +16,7 @@ RENDERING_VERSION = 4
 SOURCE = "source.json"
 """File in a bank's folder with the `identity` it is rendered from, written before any clip."""
 
-SHIPPED = Path(__file__).parents[1] / "data"
+SHIPPED = Path(__file__).parents[2] / "data"
 """Folder of the banks that come with the package."""
 
 
@@ -25,6 +25,11 @@ def cache_dir() -> Path:
     import platformdirs
 
     return Path(os.environ.get("SHOTENV_CACHE") or platformdirs.user_cache_path("shotenv"))
+
+
+def fetched_banks() -> Path:
+    """Folder of the banks that were fetched from places (`s3://...`)."""
+    return cache_dir() / "fetched"
 
 
 def bank_folder(config: BankConfig) -> Path:
@@ -46,6 +51,9 @@ def identity(config: BankConfig) -> dict[str, Any]:
     """
     unrelated = {"sensor": set(ACQUISITION_FIELDS), "own_scene": {"file", "most_faces"}}
     content = config.model_dump(mode="json", exclude=unrelated)
+    # Not named where it is as it was before there was a choice: those banks stay what they are.
+    if config.storage == "float32":
+        del content["storage"]
     return {"rendering_version": RENDERING_VERSION, "config": content}
 
 

@@ -1,4 +1,4 @@
-"""Jobs for the worker tests; worker processes import them by name."""
+"""Tasks for the worker tests; worker processes import them by name."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ import os
 import signal
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np  # noqa: F401 - loads the libraries that `blas_threads` counts.
 from threadpoolctl import threadpool_info
 
-from shotenv.render.backend.workers import run_jobs
+from unwrap.execution import run_tasks
 
 
 def squared(number: int) -> tuple[int, int]:
@@ -46,11 +48,43 @@ def unpicklable_at_three(number: int):
     return number if number != 3 else lambda: number
 
 
+_PREPARED: list[int] = []
+
+
+def prepare(threads: int) -> None:
+    _PREPARED.append(threads)
+
+
+def prepared_with(_: int) -> list[int]:
+    return _PREPARED
+
+
+def surroundings(_: int) -> tuple[list[int], str | None, str]:
+    return _PREPARED, os.environ.get("SHOTENV_TEST"), str(Path.cwd())
+
+
+def killed_once(mark: str) -> str:
+    """Dies at the first try, of which the file `mark` tells the second."""
+    if not Path(mark).exists():
+        Path(mark).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return "through"
+
+
+def found_nowhere() -> Callable[[int], int]:
+    """A function of a module that only this process has."""
+    module = ModuleType("nowhere_to_be")
+    exec("def same(number): return number", module.__dict__)
+    sys.modules["nowhere_to_be"] = module
+    return module.same
+
+
 def sleep(folder: str) -> None:
     Path(folder, f"{os.getpid()}").touch()
     time.sleep(60)
 
 
 if __name__ == "__main__":
-    for _ in run_jobs(sleep, [sys.argv[1]] * 4, workers=2):
+    folder, executor = sys.argv[1:]
+    for _ in run_tasks(sleep, [folder] * 4, executor=executor, workers=2):
         pass

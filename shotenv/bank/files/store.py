@@ -1,7 +1,8 @@
 """Files of a bank: written whole or not at all, and refused by name when they are damaged.
 
 A clip is written into a hidden folder, flushed, and renamed; so whatever stands under a final
-name is complete. Nothing in a bank is unpickled to be read. What lies where: `shotenv.bank.layout`.
+name is complete. Nothing in a bank is unpickled to be read. What lies where:
+`shotenv.bank.files.layout`.
 """
 
 from __future__ import annotations
@@ -12,16 +13,18 @@ import os
 import shutil
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 from pydantic import ValidationError
 
-from shotenv.bank.layout import (
+from shotenv.bank.files.damage import check_header, check_packed, cure_for
+from shotenv.bank.files.layout import (
     ARRAYS,
     CLIP_RECORD,
     CLIPS,
     MANIFEST,
+    PACKED_SUFFIX,
     RECORDED_CONTENTS,
     THINNED_CONTENTS,
     THINNED_FILE,
@@ -32,17 +35,23 @@ from shotenv.bank.layout import (
     RecordedContents,
     TableOfContents,
     ThinnedContents,
+    array_file,
 )
-from shotenv.config import BankConfig, one_sentence
-from unwrap.support import read_npy_header, write_json
+from shotenv.bank.files.packed import packed
+from shotenv.config import BankConfig, Storage, one_sentence
+from unwrap.support import write_json
 
 Contents = TypeVar("Contents", bound=TableOfContents)
-LARGEST_JSON_BYTES = 64 * 2**20
-"""A manifest has some 2 kB for each clip."""
+LARGEST_JSON_BYTES = 512 * 2**20
+"""A manifest has some 85 bytes for each frame: six million of them."""
 
 
 def write_clip(
-    folder: Path, arrays: Mapping[str, np.ndarray], metadata: Mapping[str, Any]
+    folder: Path,
+    arrays: Mapping[str, np.ndarray],
+    metadata: Mapping[str, Any],
+    *,
+    storage: Storage = "float32",
 ) -> ClipRecord:
     """Write a clip's arrays and its record under `folder`, atomically.
 
@@ -55,6 +64,8 @@ def write_clip(
     metadata
         The fields of `ClipRecord` that are not derived here: name, family, seed, split, time_s,
         ego_speed_m_s, yaw_rate_rad_s, gray_exposure_s.
+    storage
+        As `BankConfig.storage`.
 
     Raises
     ------
@@ -66,7 +77,7 @@ def write_clip(
     shutil.rmtree(temporary, ignore_errors=True)
     try:
         temporary.mkdir(parents=True)
-        hashes = {n: write_array(temporary / f"{n}.npy", arrays[n]) for n in ARRAYS}
+        hashes = {n: _write(temporary / array_file(n, storage), n, arrays[n]) for n in ARRAYS}
         where = f"{CLIPS}/{folder.name}"
         record = ClipRecord(**metadata, frames=frames, folder=where, sha256=hashes)
         write_json(temporary / CLIP_RECORD, {**record.model_dump(), "shape": [height, width]})
@@ -112,10 +123,22 @@ def _checked_shape(arrays: Mapping[str, np.ndarray]) -> tuple[int, int, int]:
     return frames, height, width
 
 
+def _write(path: Path, name: str, array: np.ndarray) -> str:
+    """Write an array of a clip, as the file's name tells; returns its SHA-256."""
+    if path.suffix == PACKED_SUFFIX:
+        return _write_flushed(path, lambda file: file.writelines(packed(name, array)))
+    return write_array(path, array)
+
+
 def write_array(path: Path, array: np.ndarray) -> str:
     """Write an array file, flushed to the disk; returns its SHA-256."""
+    content = np.ascontiguousarray(array)
+    return _write_flushed(path, lambda file: np.save(file, content, allow_pickle=False))
+
+
+def _write_flushed(path: Path, write: Callable[[BinaryIO], object]) -> str:
     with path.open("wb") as file:
-        np.save(file, np.ascontiguousarray(array), allow_pickle=False)
+        write(file)
         file.flush()
         os.fsync(file.fileno())
     return sha256_of(path)
@@ -174,8 +197,12 @@ def read_manifest(folder: Path) -> Manifest:
     manifest = _validated(Manifest, _load_json(path), path)
     for clip in manifest.clips:
         for name, spec in ARRAYS.items():
+            path = folder / clip.folder / array_file(name, manifest.storage)
+            if manifest.storage == "float16":
+                check_packed(path, clip.frames)
+                continue
             shape = (clip.frames, *spec.channels, manifest.height, manifest.width)
-            _check_header(folder / clip.folder / f"{name}.npy", spec.dtype, shape)
+            check_header(path, spec.dtype, shape)
     return manifest
 
 
@@ -216,7 +243,7 @@ def read_recorded_contents(folder: Path) -> RecordedContents:
     contents = _read_contents(RecordedContents, folder / RECORDED_CONTENTS)
     for clip in contents.clips:
         for name, (dtype, shape) in contents.arrays(clip.frames).items():
-            _check_header(folder / clip.folder / f"{name}.npy", dtype, shape)
+            check_header(folder / clip.folder / f"{name}.npy", dtype, shape)
     return contents
 
 
@@ -250,33 +277,6 @@ def _validated(model, content: dict, path: Path):
         raise BankError(f"{path} is damaged ({one_sentence(error)}); {cure_for(path)}") from None
 
 
-def cure_for(path: Path) -> str:
-    """What mends a bank in which the file `path` is damaged."""
-    if path.name in (THINNED_CONTENTS, THINNED_FILE):
-        return "thin the bank again, or install shotenv again where the bank is its own"
-    if any((parent / RECORDED_CONTENTS).is_file() for parent in path.parents[:3]):
-        return "import the recordings again"
-    return f"delete {path if path.name == MANIFEST else path.parent} and render the bank again"
-
-
-def _check_header(path: Path, dtype: str, shape: tuple[int, ...]) -> None:
-    """Refuse an array file whose header or length is not what the table of contents says."""
-    # The length counts, too: a mapped file that is too short ends the process (SIGBUS) when read.
-    expected = int(np.prod(shape)) * np.dtype(dtype).itemsize
-    try:
-        with path.open("rb") as file:
-            header = read_npy_header(file)
-            length = path.stat().st_size - file.tell()
-    except (OSError, ValueError):
-        raise BankError(f"{path} is missing or damaged; {cure_for(path)}") from None
-    promised = (header.shape, header.fortran_order, header.dtype, length)
-    if promised != (shape, False, np.dtype(dtype), expected):
-        raise BankError(
-            f"{path} holds {header.dtype} {header.shape}, {length} bytes; expected {dtype} "
-            f"{shape}, {expected} bytes; {cure_for(path)}"
-        )
-
-
 def verify(folder: Path, *, tick: Callable[[], object] = lambda: None) -> tuple[str, ...]:
     """Names of the files that are not as they were written; empty is good.
 
@@ -298,11 +298,12 @@ def verify(folder: Path, *, tick: Callable[[], object] = lambda: None) -> tuple[
         return () if whole else (THINNED_FILE,)
     if (folder / RECORDED_CONTENTS).is_file():
         for recorded in read_recorded_contents(folder).clips:
-            damaged += _damaged_arrays(folder, recorded)
+            damaged += _damaged_arrays(folder, recorded, "float32")
             tick()
         return tuple(damaged)
-    for clip in read_manifest(folder).clips:
-        damaged += _damaged_arrays(folder, clip)
+    manifest = read_manifest(folder)
+    for clip in manifest.clips:
+        damaged += _damaged_arrays(folder, clip, manifest.storage)
         try:
             same = read_clip_record(folder / clip.folder) == clip
         except BankError:
@@ -313,7 +314,7 @@ def verify(folder: Path, *, tick: Callable[[], object] = lambda: None) -> tuple[
     return tuple(damaged)
 
 
-def _damaged_arrays(folder: Path, clip: ClipRecord | RecordedClip) -> list[str]:
+def _damaged_arrays(folder: Path, clip: ClipRecord | RecordedClip, storage: Storage) -> list[str]:
     """Array files of a clip that have another digest than its record tells."""
-    arrays = {f"{clip.folder}/{name}.npy": digest for name, digest in clip.sha256.items()}
-    return [path for path, digest in arrays.items() if sha256_of(folder / path) != digest]
+    files = {f"{clip.folder}/{array_file(n, storage)}": sha for n, sha in clip.sha256.items()}
+    return [path for path, digest in files.items() if sha256_of(folder / path) != digest]

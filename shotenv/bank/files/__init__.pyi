@@ -1,0 +1,46 @@
+from .damage import cure_for as cure_for
+from .folders import (
+    SHIPPED as SHIPPED,
+    SOURCE as SOURCE,
+    bank_folder as bank_folder,
+    cache_dir as cache_dir,
+    fetched_banks as fetched_banks,
+    identity as identity,
+    was_rendered_from as was_rendered_from,
+)
+from .layout import (
+    ARRAYS as ARRAYS,
+    CLIP_RECORD as CLIP_RECORD,
+    CLIPS as CLIPS,
+    MANIFEST as MANIFEST,
+    RECORDED_CONTENTS as RECORDED_CONTENTS,
+    THINNED_ARRAYS as THINNED_ARRAYS,
+    THINNED_CONTENTS as THINNED_CONTENTS,
+    THINNED_FILE as THINNED_FILE,
+    BankError as BankError,
+    ClipFacts as ClipFacts,
+    ClipRecord as ClipRecord,
+    Manifest as Manifest,
+    RecordedClip as RecordedClip,
+    RecordedContents as RecordedContents,
+    StoredNetwork as StoredNetwork,
+    TableOfContents as TableOfContents,
+    ThinnedContents as ThinnedContents,
+    TruthLevel as TruthLevel,
+    array_file as array_file,
+    frame_bytes as frame_bytes,
+)
+from .packed import PackedArray as PackedArray
+from .store import (
+    read_clip_record as read_clip_record,
+    read_manifest as read_manifest,
+    read_recorded_contents as read_recorded_contents,
+    read_thinned_contents as read_thinned_contents,
+    sha256_of as sha256_of,
+    verify as verify,
+    write_array as write_array,
+    write_clip as write_clip,
+    write_manifest as write_manifest,
+    write_recorded_contents as write_recorded_contents,
+    write_thinned_contents as write_thinned_contents,
+)

@@ -1,0 +1,222 @@
+"""A bank on a place: byte for byte that of a folder, however it came there."""
+
+from __future__ import annotations
+
+import uuid
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from cut_off_places import CutOffFileSystem
+
+from shotenv.bank.clip_jobs import ClipJob, clip_jobs
+from shotenv.bank.files import (
+    BankError,
+    bank_folder,
+    fetched_banks,
+    read_clip_record,
+    verify,
+    write_clip,
+    write_manifest,
+)
+from shotenv.bank.files.layout import ARRAYS
+from shotenv.bank.opening import find_thinned, open_bank
+from shotenv.bank.published import (
+    finish_published,
+    publish_bank,
+    publish_clip,
+    standing_clips,
+    verify_published,
+)
+from shotenv.bank.thinned import ThinnedBank
+from shotenv.config.bank import BankConfig
+from shotenv.config.reader import merged
+from unwrap.storage.place import Place, StorageError
+from unwrap.storage.publishing import publish_contents
+
+HEIGHT, WIDTH, FRAMES = 24, 32, 2
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path, monkeypatch):
+    """What one test has fetched stands for no other."""
+    monkeypatch.setenv("SHOTENV_CACHE", str(tmp_path / "cache"))
+
+
+@pytest.fixture
+def config(sensor) -> BankConfig:
+    """Three clips of two frames."""
+    small = {
+        "camera": {"width": WIDTH, "height": HEIGHT},
+        "world": {"frames_per_clip": FRAMES, "families": ["garage"]},
+        **{"train_clips": 1, "validation_clips": 1, "test_clips": 1},
+    }
+    return merged(BankConfig(name="small", sensor=sensor), small)
+
+
+@pytest.fixture
+def url() -> str:
+    return f"memory://{uuid.uuid4().hex}"
+
+
+def write_made_up(job: ClipJob, *, last_bit: float = 0.0) -> None:
+    """A clip of drawn numbers in place of rendered ones; another machine's last bits differ."""
+    random = np.random.default_rng(job.seed)
+    arrays = {
+        name: random.random((FRAMES, *spec.channels, HEIGHT, WIDTH)).astype(spec.dtype)
+        for name, spec in ARRAYS.items()
+    }
+    arrays["active"] += np.float32(last_bit)
+    per_frame = ("time_s", "ego_speed_m_s", "yaw_rate_rad_s", "gray_exposure_s")
+    about = {"name": job.name, "family": job.family, "seed": job.seed, "split": job.split}
+    write_clip(job.folder, arrays, about | dict.fromkeys(per_frame, [0.0] * FRAMES))
+
+
+def render_to(url: str, config: BankConfig, scratch: Path, **changes: float) -> list[str]:
+    """As rendering to a place does: what stands is left, each clip published."""
+    standing, made = standing_clips(url, config), []
+    for job in clip_jobs(config, scratch):
+        if job.name not in standing:
+            if not job.stands:
+                write_made_up(job, **changes)
+            publish_clip(url, job)
+            made.append(job.name)
+    finish_published(url, config)
+    return made
+
+
+def folder_of(config: BankConfig, folder: Path) -> Path:
+    """The same bank, written into a folder as rendering does."""
+    jobs = clip_jobs(config, folder)
+    for job in jobs:
+        write_made_up(job)
+    records = [read_clip_record(job.folder) for job in jobs]
+    write_manifest(folder, config.name, records, (HEIGHT, WIDTH), config)
+    return folder
+
+
+def contents_of(folder: Path) -> dict[str, bytes]:
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def test_a_bank_rendered_to_a_place_is_byte_for_byte_that_of_a_folder(config, url, tmp_path):
+    assert len(render_to(url, config, tmp_path / "scratch")) == 3
+    bank = open_bank(url)
+    written = contents_of(folder_of(config, tmp_path / "here"))
+    fetched = contents_of(bank.folder)
+    # What it is rendered from is told beside it, as in the cache folder.
+    assert fetched.pop("source.json") and fetched.pop(".lock") == b""
+    assert fetched == written
+    assert bank.folder.is_relative_to(fetched_banks()) and verify(bank.folder) == ()
+    assert verify_published(url) == ()
+    assert torch.equal(bank.distance_m(torch.tensor([5])), bank.frame(5).exposure.distance_m)
+
+
+def test_an_opened_bank_is_fetched_once(config, tmp_path):
+    CutOffFileSystem.reset(empty=True)
+    url = "cutoff://banks/small"
+    render_to(url, config, tmp_path / "scratch")
+    folder = open_bank(url).folder
+    CutOffFileSystem.reset()
+    assert open_bank(url).folder == folder
+    assert CutOffFileSystem.operations == 2  # The table of contents: its size and itself.
+
+
+def test_rendering_that_breaks_anywhere_gives_the_same_bank(config, tmp_path):
+    url, cuts = "cutoff://banks/small", 0
+    whole = None
+    while True:
+        CutOffFileSystem.reset(fails_at=cuts + 1, empty=True)
+        try:
+            render_to(url, config, tmp_path / "scratch")
+            break
+        except StorageError:
+            pass
+        cuts += 1
+        CutOffFileSystem.reset()
+        with pytest.raises(StorageError, match=r"contents\.json"):
+            open_bank(url)
+        CutOffFileSystem.store.pop("/banks/small/contents.json", None)
+        standing = standing_clips(url, config)
+        made = render_to(url, config, tmp_path / "scratch")
+        assert len(made) == 3 - len(standing)
+        opened = open_bank(url)
+        assert whole in (None, opened.folder)  # Named by what is in it.
+        whole = opened.folder
+    assert cuts > 20 and verify(whole) == ()
+
+
+def test_clips_of_machines_with_other_last_bits_do_no_harm(config, url, tmp_path):
+    first, *others = clip_jobs(config, tmp_path / "one")
+    write_made_up(first)
+    publish_clip(url, first)
+    render_to(url, config, tmp_path / "two", last_bit=1e-7)
+    opened = open_bank(url)
+    assert verify(opened.folder) == ()
+    # A straggler that publishes once more changes nothing of what is complete.
+    write_made_up(replace(first, folder=tmp_path / "late" / first.name), last_bit=2e-7)
+    publish_clip(url, replace(first, folder=tmp_path / "late" / first.name))
+    assert open_bank(url).folder == opened.folder and verify_published(url) == ()
+    assert len(others) == 2
+
+
+def test_what_is_missing_or_another_bank_is_named(config, url, tmp_path):
+    with pytest.raises(StorageError, match=r"holds no contents\.json: nothing was published"):
+        open_bank(url)
+    first = clip_jobs(config, tmp_path)[0]
+    write_made_up(first)
+    publish_clip(url, first)
+    with pytest.raises(BankError, match="lacks 2 of 3 clips, such as 00001-garage"):
+        finish_published(url, config)
+    render_to(url, config, tmp_path / "scratch")
+    other = merged(config, {"seed": 9})
+    assert standing_clips(url, other) == frozenset()
+    with pytest.raises(StorageError, match=f"holds {bank_folder(config).name}, not small-"):
+        render_to(url, other, tmp_path / "other")
+
+
+def test_a_damaged_record_of_a_clip_is_named(config, url, tmp_path):
+    render_to(url, config, tmp_path / "scratch")
+    place = Place(url)
+    small = min(place.sizes("objects").items(), key=lambda item: item[1])
+    record = place.read(small[0], most_bytes=10**6)
+    place.write(small[0], record.replace(b"garage", b"barage"))
+    with pytest.raises(BankError, match=r"the record of clip .* is damaged \(not as it was"):
+        finish_published(url, config)
+    with pytest.raises(StorageError, match="another SHA-256"):
+        open_bank(url)
+    [damaged] = verify_published(url)
+    assert damaged.object_name == small[0] and damaged.path.endswith("/clip.json")
+
+
+def test_banks_of_any_kind_are_published(config, url, full, thinned, tmp_path):
+    for number, bank in enumerate((full, thinned)):
+        where = f"{url}/{number}"
+        publish_bank(bank, where)
+        fetched = open_bank(where)
+        assert type(fetched) is type(bank) and fetched.fingerprint == bank.fingerprint
+        copy = contents_of(fetched.folder)
+        assert copy.pop(".lock") == b"" and copy == contents_of(bank.folder)
+    assert isinstance(find_thinned(f"{url}/1"), ThinnedBank) and find_thinned(f"{url}/0") is None
+    # One that was rendered counts as its configuration's.
+    stands = open_bank(folder_of(config, tmp_path / "here"))
+    publish_bank(stands, f"{url}/2")
+    assert len(standing_clips(f"{url}/2", config)) == 3
+
+
+def test_a_fetched_bank_that_is_damaged_tells_its_own_cure(config, url, tmp_path):
+    render_to(url, config, tmp_path / "scratch")
+    folder = open_bank(url).folder
+    (folder / "clips" / "00000-garage" / "active.npy").write_bytes(b"")
+    with pytest.raises(BankError, match=f"delete {folder}, and it is fetched again"):
+        open_bank(url)
+
+
+def test_what_is_no_bank_is_refused(url, tmp_path):
+    (tmp_path / "notes.txt").write_text("no bank")
+    publish_contents(Place(url), "notes", [], tmp_path, ["notes.txt"])
+    with pytest.raises(BankError, match="holds notes, which is no bank"):
+        open_bank(url)

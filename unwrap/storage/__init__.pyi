@@ -1,0 +1,10 @@
+from .fetching import damaged_files as damaged_files, fetch as fetch
+from .listing import Listing as Listing, StoredFile as StoredFile
+from .place import Place as Place, StorageError as StorageError, is_url as is_url
+from .publishing import (
+    publish_contents as publish_contents,
+    publish_part as publish_part,
+    read_contents as read_contents,
+    require_label as require_label,
+    standing_parts as standing_parts,
+)

@@ -1,0 +1,184 @@
+"""A folder at a URL, through fsspec: a bucket, a shared disk, a folder of this machine."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from unwrap.support import in_one_line, replacing
+
+URL = re.compile(r"[A-Za-z][A-Za-z0-9+.:-]*://")
+PIECE_BYTES = 2**24
+"""A large file is read in pieces of so many."""
+
+
+class StorageError(OSError):
+    """A place that cannot be read or written, or what lies there is damaged; names URL and cure."""
+
+
+def is_url(text: object) -> bool:
+    """Whether it is the URL of a place (`s3://bucket/folder`), and no name or path.
+
+    Examples
+    --------
+    >>> is_url("s3://bucket/banks/wide"), is_url("/banks/wide"), is_url("wide")
+    (True, False, False)
+    """
+    return isinstance(text, str) and URL.match(text) is not None
+
+
+class Place:
+    """A folder at a URL; names of its files have `/` between their parts.
+
+    Parameters
+    ----------
+    url
+        With any protocol that fsspec knows: `file:///shared/bank`, `s3://bucket/bank`. Keys and
+        passwords are taken from where the backend of that protocol looks for them.
+
+    Raises
+    ------
+    StorageError
+        fsspec or the backend is not installed, or there is no such protocol.
+
+    Examples
+    --------
+    >>> place = Place("memory://shelf")
+    >>> place.write("a/note.txt", b"hello")
+    >>> place.sizes("a"), place.read("a/note.txt", most_bytes=100)
+    ({'a/note.txt': 5}, b'hello')
+    """
+
+    def __init__(self, url: str) -> None:
+        # Without what stands before an @, which may be a password.
+        self.url = re.sub(r"//[^/@]*@", "//", url.rstrip("/"))
+        self._files, root = _opened(url, self.url)
+        self._root = root.rstrip("/")
+        self._is_local = "file" in _protocols(self._files)
+
+    def __repr__(self) -> str:
+        return f"Place({self.url!r})"
+
+    def read(self, name: str, *, most_bytes: int) -> bytes | None:
+        """Content of a file, None where there is none.
+
+        Raises
+        ------
+        StorageError
+            It has more than `most_bytes`, or cannot be read.
+        """
+        size = self.size(name)
+        if size is None:
+            return None
+        if size > most_bytes:
+            raise StorageError(
+                f"{self._shown(name)} has {size} bytes; expected at most {most_bytes}"
+            )
+        return b"".join(self.pieces(name, size))
+
+    def read_all(self, names: Iterable[str]) -> dict[str, bytes]:
+        """Contents of several small files by name; backends that can read them side by side."""
+        paths = {self._path(name): name for name in names}
+        if not paths:
+            return {}
+        with self._telling("read", ""):
+            found = self._files.cat(list(paths))
+        return {paths[path]: content for path, content in found.items()}
+
+    def pieces(self, name: str, size: int) -> Iterator[bytes]:
+        """Content of a file of `size` bytes, piece by piece; never more, perhaps less."""
+        for start in range(0, size, PIECE_BYTES):
+            end = min(start + PIECE_BYTES, size)
+            with self._telling("read", name):
+                piece = self._files.cat_file(self._path(name), start=start, end=end)
+            yield piece[: end - start]
+
+    def size(self, name: str) -> int | None:
+        """Bytes of a file, None where there is none."""
+        with self._telling("read", name):
+            try:
+                about = self._files.info(self._path(name))
+            except FileNotFoundError:
+                return None
+        return None if about["type"] == "directory" else int(about["size"])
+
+    def sizes(self, folder: str) -> dict[str, int]:
+        """Names of the files under a folder with their bytes; none where there is no folder."""
+        with self._telling("list", folder):
+            try:
+                found = self._files.find(self._path(folder), detail=True)
+            except FileNotFoundError:
+                return {}
+        return {self._name(path): int(about["size"]) for path, about in found.items()}
+
+    def write(self, name: str, content: bytes) -> None:
+        """Put a small file there, over one of that name."""
+        path = self._path(name)
+        with self._telling("write", name):
+            if self._is_local:
+                with replacing(Path(path)) as file:
+                    file.write(content)
+                return
+            try:
+                self._files.pipe_file(path, content)
+            except FileNotFoundError:  # Where folders have to be made.
+                self._files.makedirs(path.rpartition("/")[0], exist_ok=True)
+                self._files.pipe_file(path, content)
+
+    def upload(self, name: str, source: Path) -> None:
+        """Put a copy of a local file there, over one of that name."""
+        with self._telling("write", name):
+            if not self._is_local:
+                self._files.put_file(str(source), self._path(name))
+                return
+            # fsspec would copy into place, where a crash leaves half a file.
+            with source.open("rb") as content, replacing(Path(self._path(name))) as file:
+                while piece := content.read(PIECE_BYTES):
+                    file.write(piece)
+
+    def _path(self, name: str) -> str:
+        return f"{self._root}/{name}" if name else self._root
+
+    def _name(self, path: str) -> str:
+        return path.removeprefix(f"{self._root}/")
+
+    def _shown(self, name: str) -> str:
+        return f"{self.url}/{name}" if name else self.url
+
+    @contextmanager
+    def _telling(self, verb: str, name: str) -> Iterator[None]:
+        """Whatever a backend raises, as one sentence with the URL."""
+        try:
+            yield
+        except StorageError:
+            raise
+        # Each backend has errors of its own, which share no class.
+        except Exception as error:
+            reason = in_one_line(error) or type(error).__name__
+            raise StorageError(f"cannot {verb} {self._shown(name)}: {reason}") from None
+
+
+def _opened(url: str, shown: str) -> tuple[Any, str]:
+    """fsspec's file system and the path in it."""
+    try:
+        from fsspec.core import url_to_fs
+    except ImportError:
+        raise StorageError(
+            f"{shown} needs the package fsspec; `pip install 'shotenv[scale]'` brings it"
+        ) from None
+    try:
+        # Without its memory of listings: others write there as well.
+        return url_to_fs(url, use_listings_cache=False)
+    except ImportError as error:
+        raise StorageError(
+            f"{shown} needs a package that is not installed: {in_one_line(error)}"
+        ) from None
+    except ValueError as error:
+        raise StorageError(f"{shown} is no place: {in_one_line(error)}") from None
+
+
+def _protocols(files: Any) -> tuple[str, ...]:
+    return (files.protocol,) if isinstance(files.protocol, str) else tuple(files.protocol)
