@@ -1,10 +1,10 @@
-"""Nothing that is read, however damaged or hostile, runs code, hangs, fills the memory or tracebacks.
+"""Nothing that is read, however damaged or hostile, runs code, hangs or ends in a traceback.
 
 Each kind of file is made as it should be, read once, and then changed a thousand times: truncated,
 flipped, swollen, promised to be huge, pickled, replaced by a pipe, a folder, a device or another
 file, filled with values of other kinds, with zip and alias bombs, with names that lead out of the
-folder. Each is read as a command would, in a process of its own with limited memory. What is refused
-must be a ValueError or an OSError whose message names the file; what can be read may be taken.
+folder. Each is read as a command would, in a process with limited memory. What is refused must be a
+ValueError or an OSError whose message names the file; what can be read may be taken.
 """
 
 from __future__ import annotations

@@ -129,7 +129,7 @@ def _read_bank(path: Path) -> object:
 
 
 def _read_clip(path: Path) -> object:
-    from shotenv.bank.store import read_clip_record
+    from shotenv.bank.files.store import read_clip_record
 
     return read_clip_record(path.parent)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import file_digest
@@ -89,7 +88,7 @@ class Job:
         if self.kind == "learned":
             told["agent"] = self.config.agent.told()
         if self.folder is not None:
-            with open_regular(self.folder / "policy.safetensors", sys.maxsize) as file:
+            with open_regular(self.folder / "policy.safetensors") as file:
                 told["scheduler"] = file_digest(file, "sha256").hexdigest()[:16]
         if self.source is not None:
             told["source"] = self.source.depends_on(banks)

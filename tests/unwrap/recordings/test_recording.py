@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 
-from unwrap.support import array_files as arrays_module
 from unwrap.recordings.recording import (
     ARRAYS,
     NoUsablePixelError,
@@ -16,6 +15,7 @@ from unwrap.recordings.recording import (
     recording_of,
     with_gray,
 )
+from unwrap.support import array_files as arrays_module
 from unwrap.support.array_files import read_arrays
 
 WORDS = np.random.default_rng(0).integers(1, 4095, (4, 6, 8)).astype(np.uint16)

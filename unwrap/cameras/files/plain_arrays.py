@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -143,7 +142,7 @@ def _in_order(array: np.ndarray, axes: str) -> np.ndarray:
 def _mapped(path: Path) -> np.ndarray:
     """The array of an `.npy` file, mapped: pages are read as they are looked at."""
     try:
-        with open_regular(path, sys.maxsize) as file:
+        with open_regular(path) as file:
             size = os.fstat(file.fileno()).st_size
             header = read_npy_header(file)
             following = size - file.tell()
