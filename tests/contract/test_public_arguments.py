@@ -134,7 +134,7 @@ CASES = [
         (
             "unwrap_frequencies",
             lambda v: unwrap.unwrap_frequencies(v, (24e6, 10e6), max_range_m=25.0),
-            OTHER_KINDS[:-1],  # The last is two phases.
+            OTHER_KINDS[:-2],  # The others are two phases.
         ),
         ("load_unwrapper", lambda v: unwrap.load_unwrapper(v), (*PATHS, "nowhere")),
         ("load_policy", lambda v: agents.load_policy(v), (*PATHS, "nowhere")),

@@ -57,6 +57,14 @@ def _check_fits(name: str, value: Tensor | float, raw: RawFrame, kinds: Sequence
     frames, _, height, width = raw.dcs_lsb.shape
     sizes = {"B": frames, "H": height, "W": width}
     shapes = [tuple(sizes[axis] for axis in kind) for kind in kinds]
-    if isinstance(value, torch.Tensor) and tuple(value.shape) not in shapes:
-        expected = " or ".join(map(str, shapes))
-        raise ValueError(f"{name} has shape {tuple(value.shape)}; expected {expected}")
+    if not isinstance(value, torch.Tensor) or any(_serves(value, shape) for shape in shapes):
+        return
+    expected = " or ".join(map(str, shapes))
+    raise ValueError(f"{name} has shape {tuple(value.shape)}; expected {expected}")
+
+
+def _serves(value: Tensor, shape: tuple[int, ...]) -> bool:
+    """Whether a tensor is of this shape, or common to some of its axes."""
+    own = tuple(value.shape)
+    pairs = zip(reversed(own), reversed(shape), strict=False)
+    return len(own) <= len(shape) and all(one in (1, whole) for one, whole in pairs)
