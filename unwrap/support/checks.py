@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
 
-def require_floats(alike: bool = False, **values: Any) -> None:
+def require_floats(*, alike: bool = False, **values: Any) -> None:
     """Raise TypeError unless all are tensors, ValueError unless of floats (and one shape).
 
     Examples
@@ -40,7 +40,7 @@ def require_positive(**values: Any) -> None:
     for name, value in values.items():
         if not isinstance(value, numbers.Real) or isinstance(value, bool):
             raise TypeError(f"{name} is {type(value).__name__}; expected a number")
-        if not (math.isfinite(value) and value > 0):
+        if not (math.isfinite(value) and float(value) > 0):
             raise ValueError(f"{name} is {value}; expected a positive number")
 
 
@@ -50,7 +50,7 @@ def require_not_negative(**values: Tensor | float) -> None:
 
     for name, value in values.items():
         if isinstance(value, torch.Tensor):
-            require_floats(**{name: value})
+            require_floats(alike=False, **{name: value})
             good = not value.numel() or bool(value.amin() >= 0)
         elif not isinstance(value, numbers.Real) or isinstance(value, bool):
             raise TypeError(
