@@ -32,7 +32,7 @@ def check_frames(
         raise TypeError(f"raw is {type(raw).__name__}; expected a RawFrame")
     if not isinstance(sensor, SensorDescription):
         raise TypeError(f"sensor is {type(sensor).__name__}; expected a SensorDescription")
-    require_floats(**{"raw.dcs_lsb": raw.dcs_lsb})
+    require_floats(alike=False, **{"raw.dcs_lsb": raw.dcs_lsb})
     if raw.dcs_lsb.ndim != 4 or raw.dcs_lsb.shape[1] not in tuple(Shots):
         shape = tuple(raw.dcs_lsb.shape)
         raise ValueError(f"raw.dcs_lsb has shape {shape}; expected [B, 2, 4 or 8, H, W]")
@@ -45,7 +45,7 @@ def check_frames(
         ("shift_m", shift_m, ("B",)),
     ):
         if value is not None:
-            require_floats(**{name: value})
+            require_floats(alike=False, **{name: value})
             _check_fits(name, value, raw, kinds)
     if noise_lsb is not None:
         require_not_negative(noise_lsb=noise_lsb)
