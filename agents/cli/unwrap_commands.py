@@ -11,9 +11,11 @@ from agents.cli.command import (
     DONE,
     Command,
     add_config,
+    add_executor,
     add_json,
     add_out,
     add_sensor_and_merge,
+    execution_of,
     section_of,
     write_numbers,
 )
@@ -86,6 +88,7 @@ def table_arguments(parser: ArgumentParser) -> None:
         "--page", type=Path, metavar="DIR", help="folder of the page; that of --out"
     )
     add_out(parser, "runs/table", "folder of the networks")
+    add_executor(parser, "trainings", "one after the other, with ray one per core")
     add_json(parser)
 
 
@@ -95,7 +98,9 @@ def compare_methods(arguments: Namespace) -> int:
     from unwrap.comparison import TableConfig, make_table
 
     config = section_of(TableConfig, arguments)
-    rows = make_table(config, sources, arguments.out, arguments.page, arguments.only)
+    rows = make_table(
+        config, sources, arguments.out, arguments.page, arguments.only, **execution_of(arguments)
+    )
     write_numbers(arguments, rows)
     return DONE
 
