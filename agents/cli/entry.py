@@ -24,7 +24,7 @@ from agents.cli import (
     unwrap_commands,
 )
 from agents.cli.cameras import CALIBRATE, CORRECT, DESCRIBE, RECORD
-from agents.cli.command import DONE, FAILED, INTERRUPTED, WRONG_USAGE, Command
+from agents.cli.command import DONE, FAILED, INTERRUPTED, WRONG_USAGE, Command, check_outputs
 from shotenv.config import ConfigError, one_sentence
 
 HELP = ("--help", "-h", "help")
@@ -105,9 +105,12 @@ def _parsed(command: Command, words: list[str]) -> Namespace:
     """
     parser = command.parser()
     try:
-        return parser.instantiate(parser.parse_args(words))
+        arguments = parser.instantiate(parser.parse_args(words))
     except (ArgumentError, ValueError, TypeError) as error:
         raise ConfigError(_plain(one_sentence(error))) from None
+    # Before minutes are spent on what could not be written then.
+    check_outputs(parser, arguments)
+    return arguments
 
 
 def _plain(message: str) -> str:

@@ -85,7 +85,7 @@ def check_schema(results: dict[str, Any], folder: Path) -> None:
     """
     try:
         render_comparison({folder.name: results})
-    except CANNOT_SHOW as error:
+    except (*CANNOT_SHOW, ValueError) as error:
         raise ValueError(
             f"{folder} holds results that this version cannot show ({error!r}); "
             "`shotenv evaluate` writes them anew"

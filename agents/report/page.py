@@ -54,7 +54,7 @@ def write_report(folder: Path) -> Path:
     strip = read_strip(folder / FRAMES) if results.get("every", 1) == 1 else None
     try:
         page = render_page(results, played, choices, strip)
-    except CANNOT_SHOW as error:
+    except (*CANNOT_SHOW, ValueError) as error:
         raise ValueError(
             f"{folder} holds results that this version cannot show ({error!r}); "
             "`shotenv evaluate` writes them anew"

@@ -12,15 +12,20 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from unwrap.support import write_bytes, write_text
+from unwrap.support import (
+    in_one_line,
+    read_arrays,
+    read_json as read_table,
+    write_bytes,
+    write_text,
+)
 
 CURE = "`shotenv evaluate` writes it"
 TODAY = "always_8"
@@ -125,11 +130,30 @@ def read_strip(path: Path) -> Strip:
         The file is missing or damaged.
     """
     try:
-        # Opened here: numpy leaves the file open where it is no archive.
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            return Strip(**{name: archive[name] for name in archive.files})
-    except Exception as error:  # zipfile, zlib, numpy and missing keys each raise their own
+        strip = Strip(**read_arrays(path, "", [field.name for field in fields(Strip)]))
+        _check_strip(strip)
+    except (ValueError, TypeError) as error:  # the latter where arrays are missing
         raise ValueError(f"{path} is missing or damaged ({error}); {CURE}") from None
+    return strip
+
+
+def _check_strip(strip: Strip) -> None:
+    """Raise ValueError unless arrays have the types and shapes that `Strip` tells."""
+    frames, *size = strip.gray_lsb.shape
+    maps = dict.fromkeys(("wrapped_m", "corrected_m", "truth_m"), "f")
+    rows = dict.fromkeys(("depth_mae_m", "temperature_k", "laser_energy_j"), "f")
+    of_optimum = {"optimum_shots": "i", "optimum_energy_j": "f"}
+    kinds = (
+        ({"gray_lsb": "u", "valid": "b"} | maps, [(frames, *size)]),
+        ({"shots": "i", "frame": "i", "family": "U", "drive": "iu"} | rows, [(frames,)]),
+        (of_optimum, [(0,), (frames,)]),
+        ({"unambiguous_m": "f", "max_range_m": "f"}, [()]),
+    )
+    for names, shapes in kinds:
+        for name, kind in names.items():
+            array = getattr(strip, name)
+            if array.dtype.kind not in kind or array.shape not in shapes or len(size) != 2:
+                raise ValueError(f"{name} is {array.dtype} {array.shape}")
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -141,9 +165,6 @@ def read_json(path: Path) -> dict[str, Any]:
         The file is missing or damaged.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        return read_table(path)
     except (OSError, ValueError) as error:
-        raise ValueError(f"{path} is missing or damaged ({error}); {CURE}") from None
-    if not isinstance(content, dict):
-        raise ValueError(f"{path} is damaged (not a table); {CURE}")
-    return content
+        raise ValueError(f"{path} is missing or damaged ({in_one_line(error)}); {CURE}") from None

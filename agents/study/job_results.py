@@ -8,21 +8,45 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from pydantic import Field, ValidationError
 
 from agents.evaluation import PlayedFront
 from agents.optimum import Front
-from unwrap.support import write_bytes, write_json
+from shotenv.config import one_sentence
+from unwrap.support import (
+    Section,
+    in_one_line,
+    read_arrays,
+    read_json,
+    write_bytes,
+    write_json,
+)
 
 RESULT_SCHEMA: Final = 1
 OF_FRONT: Final = ("energy", "depth_mae_m", "frames")
 SUMS: Final = ("returns", "life_used_h", "temperature_k")
+
+
+class _Points(Section):
+    """Of one front: the price and the policy of each point."""
+
+    prices: tuple[float | None, ...]
+    policies: tuple[str, ...]
+
+
+class _Told(Section):
+    """What the JSON file of a result holds."""
+
+    schema_: int = Field(alias="schema")
+    depends_on: dict[str, Any]
+    seconds: float = Field(ge=0, allow_inf_nan=False)
+    fronts: dict[str, _Points]
 
 
 @dataclass(frozen=True)
@@ -104,8 +128,7 @@ def read_result(stem: Path) -> JobResult:
     told = _described(stem.with_suffix(".json"))
     path = stem.with_suffix(".npz")
     try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
+        arrays = read_arrays(path, "")
         fronts = {
             name: PlayedFront(
                 Front(*(arrays[f"{name}/{part}"] for part in OF_FRONT)),
@@ -115,7 +138,8 @@ def read_result(stem: Path) -> JobResult:
             )
             for name, points in told["fronts"].items()
         }
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        _check_fronts(fronts)
+    except (ValueError, KeyError):
         raise ValueError(f"{path} is missing or damaged; delete it and its .json beside") from None
     others = {
         name.removeprefix("other/"): values
@@ -125,15 +149,33 @@ def read_result(stem: Path) -> JobResult:
     return JobResult(fronts, told["seconds"], others)
 
 
+def _check_fronts(fronts: Mapping[str, PlayedFront]) -> None:
+    """Raise ValueError unless the arrays of each front have a number for each clip and point."""
+    for name, one in fronts.items():
+        shape = (*one.front.frames.shape, len(one.prices))
+        sums = [one.front.energy, one.front.depth_mae_m, *(getattr(one, part) for part in SUMS)]
+        fits = all(array.shape == shape and array.dtype.kind == "f" for array in sums)
+        if not fits or len(shape) != 2 or len(one.policies) != shape[1]:
+            raise ValueError(f"{name} has arrays of other clips or points")
+
+
 def _described(path: Path) -> dict[str, Any]:
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-        schema = told["schema"]
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError):
-        raise ValueError(f"{path} is missing or damaged; expected the result of a job") from None
+        told = read_json(path)
+    except (FileNotFoundError, ValueError) as error:
+        raise ValueError(
+            f"{path} is missing or damaged ({in_one_line(error)}); expected the result of a job"
+        ) from None
+    schema = told.get("schema")
     if schema != RESULT_SCHEMA:
         raise ValueError(
             f"{path} has schema {schema!r}, but this version reads {RESULT_SCHEMA}; nothing was "
             "overwritten, `--out` takes another folder"
         )
+    try:
+        _Told.model_validate(told)
+    except ValidationError as error:
+        raise ValueError(
+            f"{path} is damaged ({one_sentence(error, _Told)}); expected the result of a job"
+        ) from None
     return told

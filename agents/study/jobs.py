@@ -26,7 +26,7 @@ from shotenv.config import (
     read_config,
 )
 from shotenv.decision import FEATURE_NAMES, feature_index
-from unwrap.support import Section
+from unwrap.support import Section, open_regular
 
 T = TypeVar("T")
 Model = TypeVar("Model", bound=Section)
@@ -88,7 +88,7 @@ class Job:
         if self.kind == "learned":
             told["agent"] = self.config.agent.told()
         if self.folder is not None:
-            with (self.folder / "policy.safetensors").open("rb") as file:
+            with open_regular(self.folder / "policy.safetensors") as file:
                 told["scheduler"] = file_digest(file, "sha256").hexdigest()[:16]
         if self.source is not None:
             told["source"] = self.source.depends_on(banks)

@@ -7,21 +7,24 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 import torch
+from pydantic import Field, TypeAdapter
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
 from agents.config import AgentConfig
 from agents.policies import Provenance, Scheduler, first_line
 from shotenv.config import EnvConfig
-from unwrap.support import write_bytes
+from unwrap.support import require_regular, write_bytes
 
 # One file, replaced whole: network, optimiser and progress of the same round, or none of them.
 CHECKPOINT: Final = "checkpoint.safetensors"
 SCHEMA: Final = "2"
+MOST_BYTES: Final = 1 << 32
+"""Of a checkpoint: the largest, with a replay buffer, have some hundred MB."""
 Validate = Callable[[Scheduler], float]
 
 
@@ -39,7 +42,7 @@ class TrainingState:
         Finished rounds when it was found; -1 before the first validation.
     """
 
-    rounds: int = 0
+    rounds: Annotated[int, Field(ge=0)] = 0
     last_return: float = -math.inf
     best_return: float = -math.inf
     best_round: int = -1
@@ -70,6 +73,9 @@ def provenance_of(
         environment=env.model_dump(mode="json") if env else {},
         seed=config.seed,
     )
+
+
+_STATE: Final = TypeAdapter(TrainingState)
 
 
 class Checkpoint:
@@ -104,6 +110,7 @@ class Checkpoint:
         if not self.path.exists():
             return TrainingState()
         try:
+            require_regular(self.path, MOST_BYTES)
             with safe_open(self.path, framework="pt") as file:
                 words = dict(file.metadata() or {})
                 tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
@@ -111,7 +118,7 @@ class Checkpoint:
             # Tensors of another configuration may not fit, which would read as damage.
             if same:
                 restore(tensors)
-            state = TrainingState(**json.loads(words["progress"]))
+            state = _STATE.validate_json(words["progress"])
         except (SafetensorError, OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
             raise ValueError(
                 f"{self.path} is damaged ({first_line(error)}); delete it to start anew"

@@ -9,7 +9,6 @@ sha256. Kept predictions that are damaged are computed again.
 
 from __future__ import annotations
 
-import json
 import shutil
 import uuid
 from dataclasses import dataclass
@@ -22,7 +21,7 @@ from torch import Tensor
 from shotenv.bank.bank import Bank, require_full
 from shotenv.bank.files import cache_dir, sha256_of, write_array
 from unwrap.networks import Prediction, Unwrapper
-from unwrap.support import progress, write_json
+from unwrap.support import progress, read_json, write_json
 
 ARRAYS = ("distance_m", "confidence")
 SUMMARY = "kept.json"
@@ -90,7 +89,7 @@ def keep_predictions(bank: Bank, unwrapper: Unwrapper) -> KeptPredictions:
 def _load(folder: Path, bank: Bank) -> KeptPredictions | None:
     """Kept predictions, or None where there are none or they are damaged."""
     try:
-        hashes = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+        hashes = read_json(folder / SUMMARY)
         if any(sha256_of(folder / f"{name}.npy") != hashes[name] for name in ARRAYS):
             return None
         maps = [np.load(folder / f"{n}.npy", mmap_mode="c", allow_pickle=False) for n in ARRAYS]

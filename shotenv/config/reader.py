@@ -10,8 +10,8 @@ from typing import Any, TypeVar
 import jsonargparse
 from pydantic import ValidationError
 
-from shotenv.config.yaml_limits import LONGEST_TEXT, limit_yaml
-from unwrap.support import Section
+from shotenv.config.yaml_limits import MOST_YAML_BYTES, limit_yaml
+from unwrap.support import Section, require_regular
 
 # Here and not in `read_config`: the command line's own parsers read files, too, and each of them is
 # made of names that come through this file.
@@ -65,8 +65,7 @@ def read_config(model: type[Model], path: Path, overrides: Sequence[str] = ()) -
     parser.add_class_arguments(model, "config", sub_configs=True)
     words = [f"--config.{word[2:]}" if word.startswith("--") else word for word in overrides]
     try:
-        if (size := path.stat().st_size) > 4 * LONGEST_TEXT:  # UTF-8 takes up to four bytes each.
-            raise ValueError(f"{size} bytes; expected at most {LONGEST_TEXT} characters")
+        require_regular(path, MOST_YAML_BYTES)
         return parser.instantiate(parser.parse_args(["--config", str(path), *words])).config
     except (jsonargparse.ArgumentError, ValueError, TypeError, OSError) as error:
         sentence = one_sentence(error)

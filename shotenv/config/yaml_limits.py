@@ -17,11 +17,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import jsonargparse
 import yaml
 from jsonargparse import get_loader, set_loader
 
+from unwrap.support import in_one_line, read_regular
+
 LONGEST_TEXT = 2**18
 """Characters of a text; the longest file in `configs/` has some 4000."""
+
+MOST_YAML_BYTES = 4 * LONGEST_TEXT
+"""Of a file: UTF-8 takes up to four bytes for a character."""
 
 MOST_VALUES = 10_000
 """Scalars, lists and mappings of a text, those that aliases repeat counted each time."""
@@ -31,6 +37,7 @@ DEEPEST = 32
 
 _Parser: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _load_yaml = get_loader("yaml")
+_read_any = jsonargparse.Path.read_text
 
 
 class YamlTooLarge(yaml.YAMLError):
@@ -40,6 +47,18 @@ class YamlTooLarge(yaml.YAMLError):
 def limit_yaml() -> None:
     """Make every parser of jsonargparse in this process refuse YAML beyond the limits."""
     set_loader("yaml", load_limited, (yaml.YAMLError,))
+    # `--config FILE` is read by jsonargparse itself, whole, before anything looks at the text.
+    jsonargparse.Path.read_text = _read_text  # type: ignore[method-assign]
+
+
+def _read_text(path: jsonargparse.Path) -> str:
+    """Text of a file that is named on a command line, if it is a regular one of sensible size."""
+    if "://" in str(path) or str(path) == "-":
+        return _read_any(path)
+    try:
+        return read_regular(Path(path.absolute), MOST_YAML_BYTES).decode()
+    except ValueError as error:
+        raise ValueError(f"{path}: {in_one_line(error)}") from None
 
 
 def load_limited(text: str, path: str | Path = "") -> Any:

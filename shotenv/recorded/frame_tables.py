@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+import io
 from pathlib import Path
 
 import numpy as np
 
-from unwrap.recordings import read_arrays, read_map
+from unwrap.recordings import read_map
+from unwrap.support import open_regular, read_arrays
 
 EGO_COLUMNS = ("ego_speed_m_s", "yaw_rate_rad_s", "gray_exposure_s")
 LARGEST_TABLE_BYTES = 1 << 24
@@ -64,12 +66,10 @@ def read_ego(path: Path, frames: int) -> dict[str, tuple[float, ...]]:
         rows than frames; the message names file and row.
     """
     try:
-        if path.stat().st_size > LARGEST_TABLE_BYTES:
-            raise ValueError(f"{path}: larger than {LARGEST_TABLE_BYTES >> 20} MiB")
-        with path.open(encoding="utf-8", newline="") as file:
-            table = csv.DictReader(file)
+        with open_regular(path, LARGEST_TABLE_BYTES) as file:
+            table = csv.DictReader(io.TextIOWrapper(file, encoding="utf-8", newline=""))
             rows, names = list(table), table.fieldnames or ()
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except (OSError, ValueError, csv.Error) as error:
         raise ValueError(f"{path}: no table of ego motion ({error})") from None
     if unknown := [name for name in names if name not in EGO_COLUMNS]:
         raise ValueError(f"{path}: column {unknown[0]!r}; expected some of {EGO_COLUMNS}")

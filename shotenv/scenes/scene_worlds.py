@@ -72,6 +72,16 @@ def read_scene(config: OwnSceneConfig) -> OwnScene:
         It cannot be read, has no faces, too many or broken ones, or holds what cannot be mapped.
     """
     path = Path(config.file)
+    try:
+        return _read_scene(path, config)
+    except SceneFileError as error:
+        # Some tell of a part of the file alone.
+        if path.name in str(error):
+            raise
+        raise SceneFileError(f"{path}: {error}") from None
+
+
+def _read_scene(path: Path, config: OwnSceneConfig) -> OwnScene:
     if path.suffix.lower() not in FORMATS or not path.is_file():
         raise SceneFileError(f"scene is {path}; expected a file of {', '.join(FORMATS)}")
     suffix, found = path.suffix.lower(), FoundLights()

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from unwrap.cameras.files import LensConfig
-from unwrap.recordings import read_arrays
+from unwrap.support import read_arrays
 
 ROUNDS = 50
 """Steps of the fixed point that undoes the distortion; wide lenses converge to 1e-9 in some 20."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from unwrap.comparison.catalogue import NETWORKS
 from unwrap.comparison.compared_frames import OpenSplits
 from unwrap.execution import Executor, run_tasks, stderr_to, visible
 from unwrap.networks import NetworkName, Unwrapper, load_unwrapper
-from unwrap.support import Positive, Section, progress, say
+from unwrap.support import Positive, Section, progress, read_json, say
 from unwrap.training import TrainConfig, train
 
 PAPERS: tuple[NetworkName, ...] = ("tofregnet", "tofsegnet")
@@ -181,5 +180,8 @@ def _is_trained(path: Path, config: TrainConfig) -> bool:
     if not (path.is_file() and numbers.is_file()):
         return False
     # Where the configuration is another, `train` goes on to refuse the checkpoint beside it.
-    trained_as = json.loads(numbers.read_text(encoding="utf-8"))["config"]
+    try:
+        trained_as = read_json(numbers).get("config")
+    except ValueError as error:
+        raise ValueError(f"{numbers} is damaged ({error}); delete it to train again") from None
     return trained_as == config.model_dump(mode="json")

@@ -21,7 +21,7 @@ from torch import Tensor, nn
 from unwrap.networks.network import Network, Settings
 from unwrap.networks.registry import build_network
 from unwrap.networks.sizes import trained_size
-from unwrap.support import in_one_line, write_bytes
+from unwrap.support import in_one_line, require_regular, write_bytes
 
 SCHEMA = "1"
 """Version of the metadata."""
@@ -68,9 +68,7 @@ def save_weights(path: Path, network: nn.Module, metadata: Mapping[str, Any]) ->
     """Write the weights of `network` and `metadata` (plain JSON values) to `path`."""
     tensors = {}
     for name, tensor in network.state_dict().items():
-        # Kernels, which are nearly all of a file, lose nothing that matters in float16.
-        half = tensor.is_floating_point() and tensor.ndim >= 2
-        stored = tensor.detach().cpu().to(torch.float16 if half else tensor.dtype)
+        stored = tensor.detach().cpu().to(_stored_type(tensor))
         tensors[name] = stored.contiguous()
     values = {"schema": SCHEMA, "sha256": fingerprint(tensors), **metadata}
     # The metadata of a safetensors file is text alone.
@@ -78,6 +76,12 @@ def save_weights(path: Path, network: nn.Module, metadata: Mapping[str, Any]) ->
         key: value if isinstance(value, str) else json.dumps(value) for key, value in values.items()
     }
     write_bytes(path, save(tensors, words))
+
+
+def _stored_type(tensor: Tensor) -> torch.dtype:
+    # Kernels, which are nearly all of a file, lose nothing that matters in float16.
+    half = tensor.is_floating_point() and tensor.ndim >= 2
+    return torch.float16 if half else tensor.dtype
 
 
 def fingerprint(tensors: Mapping[str, Tensor]) -> str:
@@ -101,11 +105,8 @@ def load_weights(path: Path) -> Weights:
     """
     cure = "train it again (`shotenv unwrap train`) or fetch it again"
     try:
-        if not path.is_file():
-            raise ValueError("no such file")
         # First of all: all tensors are read for the checksum, however large they are.
-        if path.stat().st_size > MAX_BYTES:
-            raise ValueError(f"more than {MAX_BYTES >> 20} MiB")
+        require_regular(path, MAX_BYTES)
         with safe_open(path, framework="pt") as file:
             words = dict(file.metadata() or {})
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
@@ -124,10 +125,11 @@ def read_label(path: Path) -> WeightsLabel:
         The file is missing, no safetensors file, or no network of this project.
     """
     try:
+        require_regular(path, MAX_BYTES)
         with safe_open(path, framework="pt") as file:
             words = dict(file.metadata() or {})
         return WeightsLabel(words["network"], words["sha256"])
-    except (KeyError, OSError, SafetensorError) as error:
+    except (KeyError, OSError, ValueError, SafetensorError) as error:
         raise ValueError(f"{path}: unusable network file ({in_one_line(error)})") from None
 
 
@@ -141,6 +143,12 @@ def _built(words: Mapping[str, str], tensors: Mapping[str, Tensor]) -> Weights:
     metadata = {key: _value(word) for key, word in words.items()}
     trained_size(metadata)  # Refused here rather than at the first frame.
     network = build_network(metadata["network"], Settings.of(metadata))
+    for name, value in network.state_dict().items():
+        # Loading would take the real part of complex numbers, and whole numbers as they are.
+        if name in tensors and tensors[name].dtype != _stored_type(value):
+            raise ValueError(f"{name} is {tensors[name].dtype}; expected {_stored_type(value)}")
+        if name in tensors and not tensors[name].isfinite().all():
+            raise ValueError(f"{name} is not finite")
     # The network was built in float32, and values that are loaded take its type.
     network.load_state_dict(tensors)
     return Weights(network.eval(), metadata, digest)

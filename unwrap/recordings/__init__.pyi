@@ -1,4 +1,3 @@
-from .arrays import MAX_BYTES as MAX_BYTES, read_arrays as read_arrays
 from .camera import Camera as Camera, camera_of as camera_of
 from .depth_output import (
     Points as Points,

@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from unwrap.recordings.arrays import MAX_BYTES
 from unwrap.recordings.recording import Recording, recording_of
 from unwrap.signal import ADC_BITS
-from unwrap.support import in_one_line
+from unwrap.support import MAX_BYTES, in_one_line, open_regular
 
 HIGHEST_MM = 2**16 - 1
 """Farthest distance that a depth image can hold; farther ones are stored as this."""
@@ -39,7 +38,7 @@ def read_gray16(path: Path) -> np.ndarray:
             # Pillow only warns of images that would fill the memory; here they are refused.
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             # PNG alone: Pillow goes by the content, and would let any of its decoders at the file.
-            with Image.open(path, formats=["PNG"]) as image:
+            with open_regular(path, MAX_BYTES) as file, Image.open(file, formats=["PNG"]) as image:
                 if image.mode != "I;16":
                     raise ValueError(f"mode {image.mode}; expected 16-bit gray")
                 if 2 * image.width * image.height > MAX_BYTES:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from unwrap.recordings.arrays import read_arrays
 from unwrap.recordings.images import read_folder, read_gray16
 from unwrap.recordings.recording import (
     ARRAYS,
@@ -16,6 +15,7 @@ from unwrap.recordings.recording import (
     with_offset,
 )
 from unwrap.signal import ADC_BITS, Shots
+from unwrap.support import read_arrays
 
 
 def load_recording(

@@ -15,8 +15,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from unwrap.recordings.arrays import read_arrays
 from unwrap.signal import ADC_BITS, RawFrame, from_words, mid_scale
+from unwrap.support import read_arrays
 
 ARRAYS = ("dcs", "gray", "offset_lsb", "saturated")
 """What a recording may hold."""

@@ -7,7 +7,6 @@ modulation frequency serves both.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -28,7 +27,7 @@ from unwrap.signal.decoding import (
 )
 from unwrap.signal.frames import PhaseFrame
 from unwrap.signal.frequencies import unambiguous_range_m
-from unwrap.support import write_json
+from unwrap.support import read_json, write_json
 
 BINS = 256
 """Entries of a table; linear between them, it follows the curve to 3e-4 rad, 0.3 mm at 24 MHz."""
@@ -254,9 +253,7 @@ def read_wiggle(path: Path) -> dict[float, WiggleTable]:
         The file is missing, too large, or no wiggle table; the message names it.
     """
     try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            raise ValueError(f"larger than {LARGEST_FILE_BYTES} bytes")
-        rows = json.loads(path.read_text(encoding="utf-8"))["wiggle"]
+        rows = read_json(path, LARGEST_FILE_BYTES)["wiggle"]
         return {
             float(row["frequency_hz"]): WiggleTable(tuple(map(float, row["error_rad"])))
             for row in rows

@@ -1,3 +1,4 @@
+from .array_files import MAX_BYTES as MAX_BYTES, read_arrays as read_arrays
 from .compiled import (
     array as array,
     array_of as array_of,

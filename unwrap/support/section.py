@@ -9,8 +9,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 Range = tuple[float, float]
 """(low, high), see `check_range`."""
 LARGEST = 1e12
-"""Of any quantity that a configuration tells, in its unit, and over the smallest one above 0: no slip
-of the decimal point lies beyond, and squares and products of such numbers are finite in float32."""
+"""Of any quantity that a configuration tells, in its unit; its inverse is the smallest above 0. No
+slip of the decimal point lies beyond, and products of such numbers are finite in float32."""
 
 
 def _of_sensible_size(value: float) -> float:

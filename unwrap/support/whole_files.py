@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import stat
+import sys
 from pathlib import Path
 from typing import Any, BinaryIO, NoReturn
 
@@ -19,7 +20,7 @@ MOST_JSON_BYTES = 1 << 24
 """Of tables that a person or a program reads at once; the largest of this project has some 4 MB."""
 
 
-def open_regular(path: Path, most_bytes: int) -> BinaryIO:
+def open_regular(path: Path, most_bytes: int = sys.maxsize) -> BinaryIO:
     """The open file `path`, without waiting for anybody.
 
     Raises

@@ -20,3 +20,4 @@ from .experiment import (
     play_on_one_thread as play_on_one_thread,
     prepare_bank as prepare_bank,
 )
+from .outputs import check_outputs as check_outputs

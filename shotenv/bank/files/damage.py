@@ -15,7 +15,7 @@ from shotenv.bank.files.layout import (
     BankError,
 )
 from shotenv.bank.files.packed import read_packed_header
-from unwrap.support import read_npy_header
+from unwrap.support import open_regular, read_npy_header
 
 
 def cure_for(path: Path) -> str:
@@ -41,7 +41,7 @@ def check_header(path: Path, dtype: str, shape: tuple[int, ...]) -> None:
     # The length counts, too: a mapped file that is too short ends the process (SIGBUS) when read.
     expected = int(np.prod(shape)) * np.dtype(dtype).itemsize
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             header = read_npy_header(file)
             length = path.stat().st_size - file.tell()
     except (OSError, ValueError):
@@ -65,7 +65,7 @@ def check_packed(path: Path, frames: int) -> None:
         Names file, what is there, what was expected, and the cure.
     """
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             found = read_packed_header(file, path.stat().st_size).frames
         if found != frames:
             raise ValueError(f"{found} frames; expected {frames}")

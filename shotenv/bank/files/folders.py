@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from shotenv.config import ACQUISITION_FIELDS, BankConfig
+from unwrap.support import read_json
 
 RENDERING_VERSION = 4
 """Raised when the same configuration would give other light: old banks are then left alone."""
@@ -60,4 +61,7 @@ def identity(config: BankConfig) -> dict[str, Any]:
 def was_rendered_from(folder: Path, config: BankConfig) -> bool:
     """Whether the bank in `folder`, finished or not, is that of `config`."""
     path = folder / SOURCE
-    return path.is_file() and json.loads(path.read_text()) == identity(config)
+    try:
+        return path.is_file() and read_json(path) == identity(config)
+    except ValueError:
+        return False  # Damaged, it tells nothing.

@@ -31,7 +31,7 @@ import torch
 from torch import Tensor
 
 from shotenv.bank.files.layout import ARRAYS, BankError
-from unwrap.support import in_one_line
+from unwrap.support import in_one_line, open_regular
 
 LIGHT = ("correlation", "active", "ambient")
 """Arrays that are rounded."""
@@ -154,7 +154,7 @@ class PackedArray:
         self._path, self._shape, self._stored = path, shape, stored_type(name)
         self._is_light = name in LIGHT
         try:
-            with path.open("rb") as file:
+            with open_regular(path) as file:
                 self._header = read_packed_header(file, path.stat().st_size)
                 self._content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         except (OSError, ValueError) as error:

@@ -39,7 +39,7 @@ from shotenv.bank.files.layout import (
 )
 from shotenv.bank.files.packed import packed
 from shotenv.config import BankConfig, Storage, one_sentence
-from unwrap.support import write_json
+from unwrap.support import open_regular, write_json
 
 Contents = TypeVar("Contents", bound=TableOfContents)
 LARGEST_JSON_BYTES = 512 * 2**20
@@ -145,9 +145,12 @@ def _write_flushed(path: Path, write: Callable[[BinaryIO], object]) -> str:
 
 
 def sha256_of(path: Path) -> str:
-    """SHA-256 of a file, hexadecimal."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    """SHA-256 of a file, hexadecimal; BankError where it is no regular one."""
+    try:
+        with open_regular(path) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except ValueError as error:
+        raise BankError(f"{path} is damaged ({error}); {cure_for(path)}") from None
 
 
 def write_manifest(

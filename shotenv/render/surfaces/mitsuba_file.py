@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from shotenv.render.backend import start_mitsuba
+from unwrap.support import read_regular
 
 LARGEST_XML_BYTES = 64 * 2**20
 DEEPEST_INCLUDE = 8
@@ -83,9 +84,10 @@ def _check_includes(path: Path, folder: Path, depth: int) -> None:
     """Refuse XML that reaches out of its folder while it is parsed, or that defines entities."""
     if depth > DEEPEST_INCLUDE:
         raise SceneFileError(f"{path} is included {depth} deep; expected at most {DEEPEST_INCLUDE}")
-    if (size := path.stat().st_size) > LARGEST_XML_BYTES:
-        raise SceneFileError(f"{path} has {size} bytes; expected at most {LARGEST_XML_BYTES}")
-    content = path.read_bytes()
+    try:
+        content = read_regular(path, LARGEST_XML_BYTES)
+    except ValueError as error:
+        raise SceneFileError(f"{path} is no scene that Mitsuba reads: {error}") from None
     # In other encodings than those that hold ASCII the next look would see nothing.
     if b"\0" in content:
         raise SceneFileError(f"{path} is in UTF-16 or UTF-32; expected UTF-8")

@@ -47,7 +47,7 @@ HOSTILE = {
     "an alias within itself": (f"{BEGUN}world: &w {{families: *w}}", "part of what it stands for"),
     "an alias to nothing": (f"{BEGUN}world: *w", "undefined alias"),
     "many levels": (f"{BEGUN}seed: {'[' * 100_000}", "more than 32 levels"),
-    "a long text": (f"{BEGUN}# {'x' * 3_000_000}", "262144"),
+    "a long text": (f"{BEGUN}# {'x' * 3_000_000}", "1048576"),
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -10,8 +11,8 @@ import numpy as np
 
 from unwrap.cameras.files.camera_description import CameraDescription
 from unwrap.cameras.files.stored_frames import BROKEN, StoredFrames, numbered
-from unwrap.recordings import read_arrays, read_png_folder
-from unwrap.support import in_one_line, read_npy_header
+from unwrap.recordings import read_png_folder
+from unwrap.support import in_one_line, open_regular, read_arrays, read_npy_header
 
 PER_FRAME = ("temperature_k", "integration_s", "laser_power_w", "timestamp_s")
 KNOWN = ("dcs", "gray", "saturated", "frequencies_hz", *PER_FRAME)
@@ -141,8 +142,8 @@ def _in_order(array: np.ndarray, axes: str) -> np.ndarray:
 def _mapped(path: Path) -> np.ndarray:
     """The array of an `.npy` file, mapped: pages are read as they are looked at."""
     try:
-        size = path.stat().st_size
-        with path.open("rb") as file:
+        with open_regular(path) as file:
+            size = os.fstat(file.fileno()).st_size
             header = read_npy_header(file)
             following = size - file.tell()
             if header.dtype.hasobject:

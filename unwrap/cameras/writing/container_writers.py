@@ -11,7 +11,7 @@ import numpy as np
 from unwrap.cameras.files import PER_FRAME, CameraDescription, StoredFrames
 from unwrap.cameras.writing.byte_frames import write_dump, write_raw12, write_wire
 from unwrap.cameras.writing.hdf5_logs import write_espros, write_kinect
-from unwrap.recordings import MAX_BYTES
+from unwrap.support import MAX_BYTES
 
 
 @dataclass(frozen=True)

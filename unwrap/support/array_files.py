@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import zipfile
 import zlib
 from collections.abc import Collection
@@ -10,7 +11,9 @@ from typing import IO
 
 import numpy as np
 
-from unwrap.support import in_one_line, read_npy_header
+from unwrap.support.error_text import in_one_line
+from unwrap.support.npy_header import read_npy_header
+from unwrap.support.whole_files import open_regular
 
 # 256 MiB: some hundred frames of eight samples at 320 x 240; a limit of this project.
 MAX_BYTES = 1 << 28
@@ -23,39 +26,39 @@ _BROKEN = (
 NotImplementedError where its compression is unknown."""
 
 
-def read_arrays(path: Path, alone: str, known: Collection[str]) -> dict[str, np.ndarray]:
+def read_arrays(
+    path: Path, alone: str, known: Collection[str] | None = None
+) -> dict[str, np.ndarray]:
     """Arrays of an `.npz` file by name, or the array of an `.npy` file under the name `alone`.
 
     Parameters
     ----------
-    known : collection of str
+    known : collection of str, optional
         Names that an `.npz` file may hold; another is refused, since it may be a misspelt one.
 
     Raises
     ------
     ValueError
-        The file is missing, damaged, too large, pickled or of another kind; the message names it.
+        The file is missing, damaged, too large, pickled, of another kind or no regular file; the
+        message names it.
     """
     try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise ValueError(f"larger than {MAX_BYTES >> 20} MiB")
-        if path.suffix == ".npz":
-            return _read_npz(path, known)
-        if path.suffix != ".npy":
+        if path.suffix not in (".npy", ".npz"):
             raise ValueError("expected an .npy or .npz file")
-        with path.open("rb") as file:
-            return {alone: _read_npy(file, size)}
+        with open_regular(path, MAX_BYTES) as file:
+            if path.suffix == ".npz":
+                return _read_npz(file, known)
+            return {alone: _read_npy(file, os.fstat(file.fileno()).st_size)}
     except _BROKEN as error:
         raise ValueError(f"{path}: {in_one_line(error)}") from None
 
 
-def _read_npz(path: Path, known: Collection[str]) -> dict[str, np.ndarray]:
-    with zipfile.ZipFile(path) as archive:
+def _read_npz(whole: IO[bytes], known: Collection[str] | None) -> dict[str, np.ndarray]:
+    with zipfile.ZipFile(whole) as archive:
         members = {entry.filename.removesuffix(".npy"): entry for entry in archive.infolist()}
-        unknown = [name for name in members if name not in known]
+        unknown = [name for name in members if known is not None and name not in known]
         if unknown:
-            raise ValueError(f"holds {unknown[0]!r}; expected some of {', '.join(known)}")
+            raise ValueError(f"holds {unknown[0]!r}; expected some of {', '.join(known or ())}")
         # Before anything is unpacked: a few bytes can promise gigabytes of zeros.
         if sum(entry.file_size for entry in archive.infolist()) > MAX_BYTES:
             raise ValueError(f"unpacks to more than {MAX_BYTES >> 20} MiB")

@@ -1,0 +1,51 @@
+"""Where a command is to write, looked at before it works for minutes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from jsonargparse import ArgumentParser, Namespace
+
+from shotenv.config import ConfigError
+
+OUTPUTS = ("json", "out", "page", "sheet", "mcap")
+"""Arguments that name what is written, in every command that has them: a file or, where their
+metavar says so, a folder."""
+FOLDERS = ("DIR", "FOLDER")
+
+
+def check_outputs(parser: ArgumentParser, arguments: Namespace) -> None:
+    """Refuse places that cannot be written to; nothing is made or changed.
+
+    Raises
+    ------
+    ConfigError
+        A folder where a file is wanted, a file where a folder is, or one within a file or a folder
+        that may not be written to; the message names argument and place.
+    """
+    for name, path, is_folder in _outputs(parser, arguments):
+        if is_folder and path.exists() and not path.is_dir():
+            raise ConfigError(f"{name} is {path}, which is a file; expected a folder")
+        if not is_folder and path.is_dir():
+            raise ConfigError(f"{name} is {path}, which is a folder; expected a file")
+        # The folder that a file is written into, or the next one above that stands already.
+        above = path if is_folder else path.parent
+        while not (above.exists() or above.is_symlink()) and above != above.parent:
+            above = above.parent
+        if not above.is_dir():
+            raise ConfigError(f"{name} is {path}, but {above} is no folder; expected another place")
+        if not os.access(above, os.W_OK | os.X_OK):
+            raise ConfigError(
+                f"{name} is {path}, but {above} may not be written to; expected another place"
+            )
+
+
+def _outputs(parser: ArgumentParser, arguments: Namespace) -> Iterator[tuple[str, Path, bool]]:
+    """Name of each argument that names an output, the path, and whether a folder is wanted."""
+    for action in parser._actions:
+        path = arguments.get(action.dest) if action.dest in OUTPUTS else None
+        # What begins with a scheme is no path of this machine.
+        if path is not None and "://" not in str(path):
+            yield action.dest, Path(path), action.metavar in FOLDERS
