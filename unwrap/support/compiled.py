@@ -71,7 +71,7 @@ class CodeCache(FunctionCache):
         super().__init__(function)
         # A number of its own for each version of the file in which the function stands.
         version = self._impl.locator.get_source_stamp()
-        self._cache_file = CodeFiles(Path(self.cache_path), self._impl.filename_base, version)
+        self._cache_file: Any = CodeFiles(Path(self.cache_path), self._impl.filename_base, version)
 
 
 class CodeFiles:
