@@ -71,6 +71,8 @@ def main(
             num_envs_per_env_runner=envs,
             # One batch of drives, not `envs` single environments one after another.
             gym_env_vectorize_mode=gym.VectorizeMode.VECTOR_ENTRY_POINT,
+            # A runner on a busy core needs more than the minute after which its drives are dropped.
+            sample_timeout_s=3600,
         )
         .rl_module(
             model_config=DefaultModelConfig(fcnet_hiddens=[64, 64], fcnet_activation=ACTIVATION)
@@ -85,6 +87,7 @@ def main(
         .evaluation(
             evaluation_interval=iterations,  # once, after the last
             evaluation_duration=drives,
+            evaluation_sample_timeout_s=3600,
             evaluation_config={
                 "env_config": {**chosen, "split": "test", "drives": drives},
                 # Each environment plays the drives in an order of its own; one plays each once.
