@@ -10,7 +10,7 @@ from pathlib import Path
 import benchmarks
 from benchmarks.rows import printed
 
-BENCHMARKS = ("stepping", "playing", "sensing", "unwrapping", "rendering", "networks")
+BENCHMARKS = ("stepping", "playing", "sensing", "unwrapping", "rendering", "networks", "together")
 
 
 def main() -> None:
