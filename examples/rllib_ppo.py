@@ -75,7 +75,9 @@ def main(
             sample_timeout_s=3600,
         )
         .rl_module(
-            model_config=DefaultModelConfig(fcnet_hiddens=[64, 64], fcnet_activation=ACTIVATION)
+            model_config=DefaultModelConfig(
+                fcnet_hiddens=[64, 64], fcnet_activation=ACTIVATION, vf_share_layers=False
+            )
         )
         .training(
             gamma=0.95,
