@@ -48,7 +48,7 @@ def limit_yaml() -> None:
     """Make every parser of jsonargparse in this process refuse YAML beyond the limits."""
     set_loader("yaml", load_limited, (yaml.YAMLError,))
     # `--config FILE` is read by jsonargparse itself, whole, before anything looks at the text.
-    jsonargparse.Path.read_text = _read_text  # type: ignore[method-assign]
+    jsonargparse.Path.read_text = _read_text  # type: ignore[method-assign, assignment]
 
 
 def _read_text(path: jsonargparse.Path) -> str:

@@ -11,8 +11,9 @@ import json
 import os
 import stat
 import sys
+from io import BufferedReader
 from pathlib import Path
-from typing import Any, BinaryIO, NoReturn
+from typing import Any, NoReturn
 
 from unwrap.support.error_text import in_one_line
 
@@ -20,7 +21,7 @@ MOST_JSON_BYTES = 1 << 24
 """Of tables that a person or a program reads at once; the largest of this project has some 4 MB."""
 
 
-def open_regular(path: Path, most_bytes: int = sys.maxsize) -> BinaryIO:
+def open_regular(path: Path, most_bytes: int = sys.maxsize) -> BufferedReader:
     """The open file `path`, without waiting for anybody.
 
     Raises
