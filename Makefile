@@ -1,10 +1,10 @@
-# make setup | demo | test | lint | bench | reliability. Everything is installed into .venv; PYTHON picks the interpreter.
+# make setup | demo | test | test-lowest | lint | bench | reliability. Everything is installed into .venv; PYTHON picks the interpreter.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: setup demo test lint bench reliability clean
+.PHONY: setup demo test test-lowest lint bench reliability clean
 
 setup: $(STAMP)
 	@sh tools/llvm.sh
@@ -21,6 +21,11 @@ demo: setup
 test: setup
 	$(BIN)/python -m pytest --numprocesses logical --maxprocesses 8 --dist loadfile
 
+# The lowest versions that pyproject.toml allows, in an environment of their own (tools/lowest.sh).
+test-lowest:
+	sh tools/lowest.sh $(PYTHON) .venv-lowest
+	.venv-lowest/bin/python -m pytest --numprocesses logical --maxprocesses 8 --dist loadfile
+
 lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -33,4 +38,4 @@ reliability: setup
 	$(BIN)/python -m reliability
 
 clean:
-	rm -rf $(VENV) build dist runs
+	rm -rf $(VENV) .venv-lowest build dist runs

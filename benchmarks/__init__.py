@@ -9,7 +9,9 @@
 - `unwrapping`: the kernel-density vote of an 8-DCS frame, over its form of array operations;
 - `rendering`: a rendered frame over Mitsuba's own path integrator with as many rays;
 - `networks`: arithmetic of inference and training as a share of a large matrix product's, and what
-  the public face of a network costs beside it.
+  the public face of a network costs beside it;
+- `scaling`: clips rendered by Ray over processes of this machine; two workers over twice one; and
+  milliseconds that a task without work takes.
 
 A ratio says what the code makes of a machine, and hardly depends on which. As tests do, benchmarks
 import by file what is behind a door because no other room may use it (the writer of a bank, the

@@ -10,7 +10,16 @@ from pathlib import Path
 import benchmarks
 from benchmarks.rows import printed
 
-BENCHMARKS = ("stepping", "playing", "sensing", "unwrapping", "rendering", "networks")
+BENCHMARKS = (
+    "stepping",
+    "playing",
+    "sensing",
+    "unwrapping",
+    "rendering",
+    "networks",
+    "scaling",
+    "together",
+)
 
 
 def main() -> None:

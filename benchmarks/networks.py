@@ -23,7 +23,7 @@ from unwrap.networks.network import arithmetic
 from unwrap.signal import Sensed, SensorDescription, Truth
 from unwrap.support.process_state import keep_freed_memory
 from unwrap.training import TrainConfig
-from unwrap.training.loop import TrainingModule
+from unwrap.training.module import TrainingModule
 
 HEIGHT, WIDTH, CHANNELS = 240, 320, 64
 # Assumed: what is left to gain beyond these is not worth code of one's own for it.

@@ -23,7 +23,7 @@ from unwrap.signal import Shots
 HEIGHT, WIDTH, FRAMES = 120, 160, 16
 REPEATS = 100
 DRIVES = 16
-NEVER_TRIPS = {"laser": {"trip_k": 2000.0, "release_k": 1999.0}}
+NEVER_TRIPS = {"laser": {"trip_k": 450.0, "release_k": 449.0}}
 """A tripped laser takes no samples: with this one every timed step does the whole work."""
 GOAL, VECTOR_GOAL = 3.0, 1.0
 """Assumed: a step beside the least that it must do; a vector beside its drives one by one."""

@@ -28,6 +28,9 @@ def render_arguments(parser: ArgumentParser) -> None:
     add_config(parser, BankConfig, "bank/starter.yaml")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the bank")
     parser.add_argument(
+        "--to", metavar="URL", help="a place in its stead, such as s3://bucket/bank"
+    )
+    parser.add_argument(
         "--scene", type=Path, metavar="FILE", help="render this scene (XML, PLY, OBJ, STL, GLB)"
     )
     parser.add_argument("--path", type=Path, metavar="FILE", help="ways through it, lights (YAML)")
@@ -39,7 +42,7 @@ def render_bank(arguments: Namespace) -> int:
     """Render a bank, of drawn worlds or of a scene of one's own."""
     # Here and below imports stand inside the commands: `shotenv --help` is to answer at once, and
     # torch alone takes seconds to load.
-    from shotenv.bank import build_bank
+    from shotenv.bank import build_bank, build_published
 
     config = section_of(BankConfig, arguments)
     scene, way, materials = arguments.scene, arguments.path, arguments.materials
@@ -49,6 +52,12 @@ def render_bank(arguments: Namespace) -> int:
         config = own_bank(config, scene, way, materials)
     elif any(given is not None for given in (scene, way, materials)):
         raise ConfigError("--scene, --path and --materials: expected the first two, or none")
+    if arguments.to is not None:
+        if arguments.out is not None:
+            raise ConfigError("--out and --to: expected one of them, or none")
+        build_published(config, arguments.to, **execution_of(arguments))
+        print(f"The bank is at {arguments.to}")
+        return DONE
     folder = build_bank(config, arguments.out, **execution_of(arguments))
     print(f"The bank is in {folder}")
     return DONE

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jsonargparse import ArgumentParser, Namespace
+from jsonargparse.typing import NonNegativeInt
 
 from agents.cli.command import (
     DONE,
@@ -59,14 +60,28 @@ def train_arguments(parser: ArgumentParser) -> None:
     """The experiment, and where the scheduler goes."""
     add_experiment(parser)
     add_out(parser, "runs/agent", "folder of the scheduler and its checkpoint")
+    parser.add_argument(
+        "--seeds",
+        type=NonNegativeInt,
+        nargs="+",
+        metavar="N",
+        help="train with each, into seed-N in the folder, instead of with agent.seed",
+    )
+    add_executor(parser, "seeds")
 
 
 def train(arguments: Namespace) -> int:
-    """Train a scheduler."""
-    from agents.training import train_scheduler
+    """Train a scheduler, or one with each of several seeds."""
+    from agents.training import train_scheduler, train_seeds
 
-    config = experiment_of(arguments)
+    config, execution = experiment_of(arguments), execution_of(arguments)
+    if arguments.seeds is None and execution != {"executor": "local", "workers": None}:
+        raise ConfigError("--executor and --workers: expected with --seeds alone")
     prepare_bank(config.env)
+    if arguments.seeds is not None:
+        folders = train_seeds(config, arguments.seeds, arguments.out, **execution)
+        print(f"The schedulers are in {', '.join(map(str, folders))}")
+        return DONE
     play_on_one_thread()
     train_scheduler(config, arguments.out)
     print(f"The scheduler is in {arguments.out}; `shotenv evaluate {arguments.out}` judges it.")

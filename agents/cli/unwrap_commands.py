@@ -11,9 +11,11 @@ from agents.cli.command import (
     DONE,
     Command,
     add_config,
+    add_executor,
     add_json,
     add_out,
     add_sensor_and_merge,
+    execution_of,
     section_of,
     write_numbers,
 )
@@ -27,23 +29,39 @@ def train_arguments(parser: ArgumentParser) -> None:
     # Not `add_config`: there is no file of defaults, which are the fields' own.
     parser.add_argument("--config", action="config", help="YAML file over the defaults")
     parser.add_class_arguments(TrainConfig, None, sub_configs=True)
+    parser.add_argument(
+        "--devices",
+        type=int,
+        default=1,
+        metavar="N",
+        help="GPUs of this machine that share each batch; processes where there is none",
+    )
+    parser.add_argument(
+        "--nodes", type=int, default=1, metavar="M", help="machines that do so (docs/scale.md)"
+    )
     add_out(parser, "runs/unwrap", "folder of the weights and the checkpoint")
 
 
 def train_network(arguments: Namespace) -> int:
     """Train an unwrapping network."""
     from shotenv.dataset import for_sensor, gray_warning, sources
-    from unwrap.training import TrainConfig, train
+    from unwrap.training import TrainConfig, is_first_process, train
 
     config = for_sensor(section_of(TrainConfig, arguments))
     splits = sources(config)  # What does not go together is told at once.
-    if (warning := gray_warning(config)) is not None:
+    # What a launcher started on many machines speaks with one voice.
+    talks = is_first_process()
+    if talks and (warning := gray_warning(config)) is not None:
         say(f"warning: {warning}")
-    print(
-        f"{config.network} for {config.f1_hz / 1e6:g} MHz: wraps of "
-        f"{config.settings.unambiguous_m:.3g} m, up to {config.max_range_m:g} m"
-    )
-    print(f"The network is in {train(config, splits, arguments.out)}")
+    if talks:
+        print(
+            f"{config.network} for {config.f1_hz / 1e6:g} MHz: wraps of "
+            f"{config.settings.unambiguous_m:.3g} m, up to {config.max_range_m:g} m"
+        )
+    devices, nodes = arguments.devices, arguments.nodes
+    path = train(config, splits, arguments.out, devices=devices, nodes=nodes)
+    if talks:
+        print(f"The network is in {path}")
     return DONE
 
 
@@ -86,6 +104,7 @@ def table_arguments(parser: ArgumentParser) -> None:
         "--page", type=Path, metavar="DIR", help="folder of the page; that of --out"
     )
     add_out(parser, "runs/table", "folder of the networks")
+    add_executor(parser, "trainings", "one after the other, with ray one per core")
     add_json(parser)
 
 
@@ -95,7 +114,9 @@ def compare_methods(arguments: Namespace) -> int:
     from unwrap.comparison import TableConfig, make_table
 
     config = section_of(TableConfig, arguments)
-    rows = make_table(config, sources, arguments.out, arguments.page, arguments.only)
+    rows = make_table(
+        config, sources, arguments.out, arguments.page, arguments.only, **execution_of(arguments)
+    )
     write_numbers(arguments, rows)
     return DONE
 

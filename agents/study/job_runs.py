@@ -28,7 +28,7 @@ from agents.training import train_scheduler
 from shotenv.config import EnvConfig
 from shotenv.decision import open_problem
 from unwrap.execution import Executor, run_tasks, stderr_to, visible
-from unwrap.support import progress
+from unwrap.support import progress, say
 
 JOBS_PER_WORKER = 1000
 """Jobs after which a process is replaced by a new one: they leave nothing behind, but who knows."""
@@ -93,6 +93,7 @@ def run_jobs(
             for task, error in finished:
                 if error is not None:
                     failed.append(str(error))
+                    say(f"{error}; the others go on")  # Now, and not hours later.
                 order.release(task)
                 bar.update(1)
         except KeyboardInterrupt:

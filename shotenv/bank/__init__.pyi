@@ -39,6 +39,7 @@ from .predictions import (
     keep_predictions as keep_predictions,
 )
 from .published import (
+    build_published as build_published,
     fetch_bank as fetch_bank,
     finish_published as finish_published,
     publish_bank as publish_bank,

@@ -27,6 +27,7 @@ from shotenv.config import BankConfig
 from shotenv.render.backend import RendererError, limit_threads, require_device
 from unwrap.execution import Executor, WorkerError, available_cores, run_tasks
 from unwrap.signal import Shots
+from unwrap.storage import StorageError
 from unwrap.support import progress, say, write_json
 
 SECONDS_PER_MILLION_RAYS = 0.7
@@ -91,7 +92,7 @@ def build_bank(
         # Only now, under the lock: another process may have rendered them meanwhile.
         missing = [job for job in jobs if read_clip_record(job.folder) is None]
         _announce(config, folder, len(jobs), missing)
-        _render(missing, workers, executor)
+        render_clips(missing, workers, executor)
         _delete_half_written(folder)
         size = (config.camera.height, config.camera.width)
         seen_s = SEEN_S if executor == "ray" else 0.0
@@ -154,7 +155,8 @@ def _announce(config: BankConfig, folder: Path, clips: int, missing: Sequence[Cl
     )
 
 
-def _render(jobs: Sequence[ClipJob], workers: int | None, executor: Executor) -> None:
+def render_clips(jobs: Sequence[ClipJob], workers: int | None, executor: Executor) -> None:
+    """Render clips under a bar of progress; see `build_bank`."""
     if not jobs:
         return
     if executor == "local":
@@ -172,7 +174,7 @@ def _render(jobs: Sequence[ClipJob], workers: int | None, executor: Executor) ->
             # A clip of more frames than that still has to be one worker's.
             tasks_per_worker=max(1, FRAMES_PER_WORKER // longest),
             prepare=limit_threads,
-            passing=(BankError, RendererError, WorkerError),
+            passing=(BankError, RendererError, StorageError, WorkerError),
             name=lambda job: f"clip {job.name}",
         )
         for job, _ in done:

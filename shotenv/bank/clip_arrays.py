@@ -92,7 +92,7 @@ class PackedClips(ClipArrays[PackedArray]):
 
     def frame(self, clip: int, name: str, number: int) -> Tensor:
         """See `ClipArrays.frame`."""
-        return torch.from_numpy(self[clip][name].frame(number)).unsqueeze(0)
+        return self[clip][name].frame(number).unsqueeze(0)
 
     def _opened(self, folder: Path, name: str) -> PackedArray:
         shape = (*ARRAYS[name].channels, *self._size)

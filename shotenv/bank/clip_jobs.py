@@ -14,7 +14,8 @@ from shotenv.config import OWN, BankConfig, Family, MountConfig, Split
 class ClipJob:
     """Everything a worker needs to render one clip.
 
-    `way` is the number of the clip in `config.own_scene`, None where the world is drawn.
+    `way` is the number of the clip in `config.own_scene`, None where the world is drawn. `url` is
+    the place where the clip is published; None where it stays in its folder.
     """
 
     config: BankConfig
@@ -26,6 +27,7 @@ class ClipJob:
     frames: int
     mount: MountConfig
     way: int | None = None
+    url: str | None = None
 
     @property
     def stands(self) -> bool:

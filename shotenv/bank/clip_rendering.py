@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import torch
 
 from shotenv.bank.clip_jobs import ClipJob
 from shotenv.bank.files import ARRAYS, BankError, write_clip
+from shotenv.bank.published import publish_clip
 from shotenv.config import BankConfig, Family
 from shotenv.render import FrameRenderer, RenderedFrame
 from shotenv.scenes import own_world, read_scene
@@ -37,7 +40,16 @@ def render_missing(job: ClipJob) -> None:
     ------
     WorkerError
         This machine does not see the bank's folder.
+    unwrap.storage.StorageError
+        The place where the clip goes cannot be written.
     """
+    if job.url is not None:
+        # What of it was published before is as good, and another's may be the one that is named.
+        with tempfile.TemporaryDirectory() as scratch:
+            here = replace(job, folder=Path(scratch) / job.name)
+            render_clip(here)
+            publish_clip(job.url, here)
+        return
     visible(job.folder.parent)
     if not job.stands:
         render_clip(job)

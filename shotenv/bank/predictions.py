@@ -10,7 +10,6 @@ sha256. Kept predictions that are damaged are computed again.
 from __future__ import annotations
 
 import shutil
-import uuid
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +20,7 @@ from torch import Tensor
 from shotenv.bank.bank import Bank, require_full
 from shotenv.bank.files import cache_dir, sha256_of, write_array
 from unwrap.networks import Prediction, Unwrapper
-from unwrap.support import progress, read_json, write_json
+from unwrap.support import progress, read_json, unfinished, write_json
 
 ARRAYS = ("distance_m", "confidence")
 SUMMARY = "kept.json"
@@ -103,7 +102,7 @@ def _load(folder: Path, bank: Bank) -> KeptPredictions | None:
 
 def _compute(folder: Path, bank: Bank, unwrapper: Unwrapper) -> None:
     """Predict every frame and put the result in `folder`, whole or not at all."""
-    temporary = folder.with_name(f".{folder.name}.{uuid.uuid4().hex[:8]}")
+    temporary = unfinished(folder)
     temporary.mkdir(parents=True)
     try:
         maps = zip(ARRAYS, _predict_all(bank, unwrapper), strict=True)

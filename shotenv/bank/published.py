@@ -8,12 +8,14 @@ from __future__ import annotations
 import hashlib
 import json
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 from filelock import FileLock
 from tqdm import tqdm
 
 from shotenv.bank.bank import Bank
+from shotenv.bank.build import bank_bytes, render_clips
 from shotenv.bank.clip_jobs import ClipJob, clip_jobs
 from shotenv.bank.files import (
     CLIP_RECORD,
@@ -32,6 +34,7 @@ from shotenv.bank.files import (
     write_manifest,
 )
 from shotenv.config import BankConfig
+from unwrap.execution import Executor
 from unwrap.storage import (
     Listing,
     Place,
@@ -44,9 +47,43 @@ from unwrap.storage import (
     require_label,
     standing_parts,
 )
-from unwrap.support import progress, write_json
+from unwrap.support import progress, say, write_json
 
 TABLES = (MANIFEST, THINNED_CONTENTS, RECORDED_CONTENTS)
+
+
+def build_published(
+    config: BankConfig, url: str, *, workers: int | None = None, executor: Executor = "local"
+) -> None:
+    """Render the bank of `config` onto a place; clips that stand there are kept.
+
+    Each worker renders a clip into a folder of its own machine, publishes it and deletes it.
+
+    Parameters
+    ----------
+    workers, executor
+        As of `build_bank`; the machines of a cluster need no folder in common.
+
+    Raises
+    ------
+    unwrap.storage.StorageError
+        The place holds another bank, or cannot be read or written.
+    BankError, RendererError, WorkerError
+        As of `build_bank`.
+    """
+    place = Place(url)
+    require_label(place, bank_folder(config).name)
+    standing = standing_clips(url, config)
+    jobs = clip_jobs(config, Path())
+    missing = [replace(job, url=url) for job in jobs if job.name not in standing]
+    frames = sum(job.frames for job in missing)
+    say(
+        f"Rendering bank '{config.name}' to {place.url}: {len(missing)} of {len(jobs)} clips, "
+        f"{frames} frames, {bank_bytes(config, frames) / 1e6:.0f} MB. It can be interrupted; the "
+        "next start continues."
+    )
+    render_clips(missing, workers, executor)
+    finish_published(url, config)
 
 
 def standing_clips(url: str, config: BankConfig) -> frozenset[str]:

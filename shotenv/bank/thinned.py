@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import io
 import shutil
-import uuid
 import zipfile
 from collections.abc import Mapping
 from functools import lru_cache
@@ -41,7 +40,7 @@ from shotenv.bank.files import (
 from shotenv.bank.predictions import PredictedDistances
 from shotenv.sensor import Exposure
 from unwrap.networks import WeightsLabel
-from unwrap.support import write_bytes
+from unwrap.support import unfinished, write_bytes
 
 SKY = np.iinfo(np.uint16).max
 """Stored distance where nothing is hit."""
@@ -243,7 +242,7 @@ def write_thinned(
     """
     if folder.is_dir() and any(folder.iterdir()):
         raise BankError(f"{folder} is not empty; choose another folder, or delete it")
-    temporary = folder.with_name(f".{folder.name}.{uuid.uuid4().hex[:8]}")
+    temporary = unfinished(folder)
     try:
         temporary.mkdir(parents=True)
         planes: dict[str, Any] = {name: _planes(array) for name, array in arrays.items()}

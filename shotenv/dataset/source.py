@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from shotenv.bank import check_fits, gray_differences, open_bank
+from shotenv.bank import Bank, check_fits, gray_differences, open_bank
 from shotenv.config import BankConfig, ConfigError, EnvConfig, env_config, find_config, merged
 from shotenv.dataset.sensed_frames import SensedFrames
 from shotenv.sensor import description_of
@@ -35,7 +35,36 @@ def for_sensor(config: TrainConfig) -> TrainConfig:
     return config.at_sensor(description_of(bench_config(config.sensor).sensor))
 
 
-def sources(config: TrainConfig) -> Callable[[str], SensedFrames]:
+class Splits:
+    """Frames of each split of a bank, for one training; see `sources`.
+
+    Pickled it is its configuration: another process opens the bank anew and shares what the system
+    holds of its files.
+    """
+
+    def __init__(self, config: TrainConfig, bank: Bank, bench: EnvConfig, gray_only: bool) -> None:
+        self._config, self._bank = config, bank
+        self._bench, self._gray_only = bench, gray_only
+
+    def __call__(self, split: str) -> SensedFrames:
+        """The frames of a split."""
+        config = self._config
+        return SensedFrames(
+            self._bank,
+            self._bank.frames(split, by=config.split_by),
+            self._bench,
+            range_m=config.clamp_m,
+            truth=config.truth,
+            stride=config.stride,
+            remembers=config.memory,
+            gray_only=self._gray_only,
+        )
+
+    def __reduce__(self) -> tuple[Callable[[TrainConfig], Splits], tuple[TrainConfig]]:
+        return sources, (self._config,)
+
+
+def sources(config: TrainConfig) -> Splits:
     """Frames of each split of the bank that a network is trained on; the bank is rendered first.
 
     A network that looks at the gray image alone is trained on any bank, whatever sensor that was
@@ -56,19 +85,7 @@ def sources(config: TrainConfig) -> Callable[[str], SensedFrames]:
             assert bank.config is not None  # A bank without one fits everything.
             raise ValueError(f"{error}: {rendering(bank.config, config.sensor)}") from None
 
-    def frames(split: str) -> SensedFrames:
-        return SensedFrames(
-            bank,
-            bank.frames(split, by=config.split_by),
-            bench,
-            range_m=config.clamp_m,
-            truth=config.truth,
-            stride=config.stride,
-            remembers=config.memory,
-            gray_only=gray_only,
-        )
-
-    return frames
+    return Splits(config, bank, bench, gray_only)
 
 
 def gray_warning(config: TrainConfig) -> str | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import uuid
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -25,7 +24,7 @@ from shotenv.recorded.recordings_file import (
 )
 from shotenv.recorded.taking_in import Shape, opened, shape_of, take_in
 from unwrap.cameras.files import CameraDescription
-from unwrap.support import progress, write_bytes, write_text
+from unwrap.support import progress, unfinished, write_bytes, write_text
 
 ENV_FILE, SENSOR_FILE, LASER_FILE = "env.yaml", "sensor.yaml", "laser.yaml"
 LONGEST_DRIVE = 256
@@ -66,7 +65,7 @@ def import_bank(
     rows = rows_of(config, folder, camera)
     shape = shape_of(opened(rows[0], folder, camera), sensor)
     level = level_of(truth, rows, shape.samples)
-    temporary = out.resolve().with_name(f".{out.name}.{uuid.uuid4().hex[:8]}")
+    temporary = unfinished(out.resolve())
     try:
         temporary.mkdir(parents=True)
         clips: list[RecordedClip] = []

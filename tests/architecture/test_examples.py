@@ -15,6 +15,8 @@ import gymnasium
 import pytest
 import torch
 
+from agents.policies import NetworkPolicy, Provenance, load_policy, score_network
+from shotenv.decision import FEATURE_NAMES
 from unwrap import unambiguous_range_m
 
 ROOT = Path(__file__).parents[2]
@@ -109,14 +111,45 @@ assert (observations[0] == single.reset(seed=0)[0]).all() and len(infos) == 2
 
 def test_a_runner_of_rllib_finds_the_environment():
     """RLlib is not installed here: what it does with the example's id in a process of its own."""
-    source = (ROOT / "examples" / "rllib.py").read_text("utf-8")
-    compile(source, "rllib.py", "exec")
-    (env_id,) = re.findall(r'^ENV_ID = "(.+)"', source, re.MULTILINE)
+    source = (ROOT / "examples" / "rllib_ppo.py").read_text("utf-8")
+    env_id = example("rllib_ppo").ENV_ID
     assert env_id == "shotenv:shotenv/ShotSchedule-v0" and "VECTOR_ENTRY_POINT" in source
     told = subprocess.run(
         [sys.executable, "-c", RUNNER.format(env_id=env_id)], capture_output=True, text=True
     )
     assert told.returncode == 0, told.stderr
+
+
+class TrainedModule:
+    """What the example asks of RLlib's default module, whose actor is `network` times `factor`."""
+
+    def __init__(self, network, factor=1.0):
+        self.network, self.factor = network, factor
+
+    def state_dict(self):
+        places = {0: "encoder.actor_encoder.net.mlp.0", 2: "encoder.actor_encoder.net.mlp.2"}
+        places[4] = "pi.net.mlp.0"
+        critic = {"encoder.critic_encoder.net.mlp.0.weight": torch.ones(1, 1)}
+        state = self.network.state_dict().items()
+        return critic | {f"{places[int(name[0])]}{name[1:]}": value for name, value in state}
+
+    def forward_inference(self, batch):
+        return {"action_dist_inputs": self.factor * self.network(batch["obs"])}
+
+
+def test_a_policy_of_rllib_becomes_a_scheduler(tmp_path):
+    rllib = example("rllib_ppo")
+    network = score_network((len(FEATURE_NAMES), 8, 8, 3), "tanh")
+    module = TrainedModule(network)
+    told = Provenance(algorithm="rllib ppo", feature_names=FEATURE_NAMES)
+    scheduler = NetworkPolicy(rllib.actor_network(module.state_dict()), told)
+    rllib.check(scheduler, module)
+    scheduler.save(tmp_path)
+    rllib.check(load_policy(tmp_path), module)
+    with pytest.raises(ValueError, match="scores differ from RLlib's logits"):
+        rllib.check(scheduler, TrainedModule(network, factor=1.1))
+    with pytest.raises(ValueError, match="expected an actor of linear layers"):
+        rllib.actor_network({"encoder.cnn.weight": torch.ones(1, 1)})
 
 
 @pytest.mark.parametrize("name", WITH_EXAMPLES)

@@ -17,6 +17,7 @@ from unwrap.comparison.table_trainings import (
     planned_trainings,
     train_missing,
 )
+from unwrap.execution import Executor
 from unwrap.networks import NetworkName, Unwrapper
 from unwrap.support import progress, say, write_bytes, write_json
 from unwrap.training import training_device
@@ -32,6 +33,9 @@ def make_table(
     out: Path,
     page: Path | None = None,
     only: Sequence[str] | None = None,
+    *,
+    executor: Executor = "local",
+    workers: int | None = None,
 ) -> list[Row]:
     """Train what is not trained yet into `out`, score it, and write page, numbers and figure.
 
@@ -49,6 +53,8 @@ def make_table(
         Folder of page, numbers and figure; `out` without.
     only : sequence of str, optional
         Names of networks: these are trained, and nothing is scored.
+    executor, workers
+        Where networks are trained, and how many at a time; see `train_missing`.
 
     Returns
     -------
@@ -63,7 +69,7 @@ def make_table(
     wanted = [t for t in planned_trainings(config) if not only or t.config.network in only]
     if not wanted:
         raise ValueError(f"only is {only}; expected some of {', '.join(config.networks)}")
-    networks = {training: train_missing(training, open_splits, out) for training in wanted}
+    networks = train_missing(wanted, open_splits, out, executor=executor, workers=workers)
     if only:
         say(f"{len(networks)} networks stand in {out}")
         return []

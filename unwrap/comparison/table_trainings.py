@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from pydantic import Field
 
 from unwrap.comparison.catalogue import NETWORKS
 from unwrap.comparison.compared_frames import OpenSplits
+from unwrap.execution import Executor, run_tasks, stderr_to, visible
 from unwrap.networks import NetworkName, Unwrapper, load_unwrapper
-from unwrap.support import Positive, Section, read_json, say
+from unwrap.support import Positive, Section, progress, read_json, say
 from unwrap.training import TrainConfig, train
 
 PAPERS: tuple[NetworkName, ...] = ("tofregnet", "tofsegnet")
@@ -95,20 +96,81 @@ def _training(
     return Training(NETWORKS[network].label + ours, recipe, train_config)
 
 
-def train_missing(training: Training, open_splits: OpenSplits, out: Path) -> Unwrapper:
-    """Train the network unless it stands in `out` already, and load it; may take hours.
+class TrainingTask(NamedTuple):
+    """One training for a worker, whose network has its own folder in that of the table."""
+
+    training: Training
+    open_splits: OpenSplits
+    out: Path
+
+    @property
+    def folder(self) -> Path:
+        """Of the network."""
+        return self.out / self.training.folder
+
+    @property
+    def path(self) -> Path:
+        """Of the weights."""
+        return self.folder / f"{self.training.config.network}.safetensors"
+
+    @property
+    def stands(self) -> bool:
+        """Whether the weights were trained as the configuration says, to the end."""
+        return _is_trained(self.path, self.training.config)
+
+
+def train_one(task: TrainingTask) -> None:
+    """Train a network; may take hours."""
+    config = task.training.config
+    say(f"training {task.training.label}, split by {config.split_by}, {config.truth} truth")
+    train(config, task.open_splits(config), task.folder)
+
+
+def train_with_log(task: TrainingTask) -> None:
+    """As `train_one`; bars and lines go to a file beside the folder of the network."""
+    with stderr_to(visible(task.out) / f"{task.training.folder}.log"):
+        train_one(task)
+
+
+def train_missing(
+    trainings: Sequence[Training],
+    open_splits: OpenSplits,
+    out: Path,
+    *,
+    executor: Executor = "local",
+    workers: int | None = None,
+) -> dict[Training, Unwrapper]:
+    """Train the networks that do not stand in `out` yet, and load all.
 
     Parameters
     ----------
+    open_splits : callable
+        At the top level of a module, where workers train.
     out : Path
-        Folder of the table; the network has its own in it.
+        Folder of the table.
+    executor, workers
+        See `run_tasks`. With "local" and fewer than two workers the trainings follow each other
+        here, each on all cores.
     """
-    config, folder = training.config, out / training.folder
-    path = folder / f"{config.network}.safetensors"
-    if not _is_trained(path, config):
-        say(f"training {training.label}, split by {config.split_by}, {config.truth} truth")
-        train(config, open_splits(config), folder)
-    return load_unwrapper(path)
+    out = out.resolve()
+    out.mkdir(parents=True, exist_ok=True)
+    tasks = [TrainingTask(training, open_splits, out) for training in trainings]
+    missing = [task for task in tasks if not task.stands]
+    if executor == "local" and (workers or 1) == 1:
+        for task in missing:
+            train_one(task)
+    else:
+        with progress(len(tasks), "trainings", "network", done=len(tasks) - len(missing)) as bar:
+            for _ in run_tasks(
+                train_with_log,
+                missing,
+                executor=executor,
+                workers=workers,
+                tasks_per_worker=1,
+                name=lambda task: f"training {task.training.folder}",
+            ):
+                bar.update(1)
+    return {task.training: load_unwrapper(task.path) for task in tasks}
 
 
 def _is_trained(path: Path, config: TrainConfig) -> bool:

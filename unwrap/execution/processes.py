@@ -5,6 +5,7 @@ linger.
 from __future__ import annotations
 
 import multiprocessing
+import pickle
 import signal
 import sys
 import time
@@ -99,7 +100,10 @@ class _Worker:
         # Not forked: threads and locks of Dr.Jit and torch do not survive it.
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(theirs, work, threads), daemon=True)
+        # As bytes: what the function imports, torch perhaps, is loaded by a process that already
+        # ends with its parent.
+        told = (theirs, pickle.dumps(work), threads)
+        self._process = context.Process(target=_serve, args=told, daemon=True)
         with nullcontext() if work.function.__module__ == "__main__" else _no_main_module():
             self._process.start()
         # Closed here, so that the end of the process ends the pipe.
@@ -176,10 +180,11 @@ def _no_main_module() -> Iterator[None]:
         sys.modules["__main__"] = main
 
 
-def _serve(pipe: Connection, work: Work, threads: int) -> None:
+def _serve(pipe: Connection, pickled: bytes, threads: int) -> None:
     """Life of a worker process: tasks come in, their outcomes go out."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
+    work: Work = pickle.loads(pickled)
     work.begin(threads)
     while True:
         try:

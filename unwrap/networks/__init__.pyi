@@ -10,11 +10,13 @@ from .losses import (
     LossWeights as LossWeights,
     depth_guided_loss as depth_guided_loss,
     masked_mean as masked_mean,
+    own as own,
     regression_loss as regression_loss,
     scale_invariant_loss as scale_invariant_loss,
     ssim_loss as ssim_loss,
 )
 from .network import (
+    Draw as Draw,
     Needs as Needs,
     Network as Network,
     Prediction as Prediction,

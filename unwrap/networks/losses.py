@@ -7,7 +7,9 @@ Number of Shots (2023).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import torch
 from torch import Tensor
@@ -19,10 +21,17 @@ EQUATION_7 = (0.5, 0.4, 0.1)
 IGNORED = -100
 """Class of a pixel that `torch.nn.functional.cross_entropy` leaves out."""
 
+Count = TypeVar("Count", int, Tensor)
+
+
+def own(count: Count) -> Count:
+    """The total of a count where one process has the whole batch: the count."""
+    return count
+
 
 @dataclass(frozen=True)
 class LossWeights:
-    """How the terms of TofRegNet's loss count.
+    """How the terms of TofRegNet's loss count, and how frames do that several processes share.
 
     Attributes
     ----------
@@ -32,11 +41,16 @@ class LossWeights:
         See `scale_invariant_loss`; the paper's is 1.
     wrap : float
         Weight of `wrap_loss`; 0 in the paper.
+    total : callable
+        Gives the sum of a number of images or pixels over all processes that have a share of the
+        batch. Every mean divides by such totals, so that a loss is the process's own part: the
+        parts of all are together the loss of the whole batch, and so are their gradients.
     """
 
     equation_7: float = 1.0
     mean_share: float = 1.0
     wrap: float = 0.0
+    total: Callable = own
 
 
 def scale_invariant_loss(prediction: Tensor, truth: Tensor, mean_share: float = 1.0) -> Tensor:
@@ -145,8 +159,10 @@ def regression_loss(
     )
 
 
-def masked_mean(values: Tensor, mask: Tensor) -> Tensor:
+def masked_mean(values: Tensor, mask: Tensor, total: Callable = own) -> Tensor:
     """Mean of `values` where the bool `mask` of their shape holds; 0 where it holds nowhere.
+
+    Of processes that share a batch each gives its part of the mean, see `LossWeights.total`.
 
     Examples
     --------
@@ -154,7 +170,7 @@ def masked_mean(values: Tensor, mask: Tensor) -> Tensor:
     tensor(2.)
     """
     # `where`, not a product: NaN times 0 is NaN.
-    return values.where(mask, 0.0).sum() / mask.sum().clamp(min=1)
+    return values.where(mask, 0.0).sum() / total(mask.sum()).clamp(min=1)
 
 
 def wrap_loss(prediction_m: Tensor, truth_m: Tensor, unambiguous_m: float) -> Tensor:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Self
 
@@ -15,6 +15,8 @@ from unwrap.signal import RawFrame, Sensed, SensorDescription, Truth, unambiguou
 
 Needs = Literal["gray", "samples"]
 """What a network looks at: the gray image alone, or the samples, too."""
+Draw = Callable[..., Tensor]
+"""`draw(*shape)` gives random numbers of [0, 1), float32 [B, *shape], for the frames of a batch."""
 
 
 @dataclass(frozen=True)
@@ -86,8 +88,8 @@ class Network(nn.Module):
         output = network(features)
         prediction = network.predict(output, sensed, sensor)  # metres and confidence
 
-    Training puts `loss` in place of the third. A new network overrides `features`, `forward`,
-    `loss` and `predict`, and says what it looks at (`needs`).
+    Training puts `as_trained_on` before the first and `loss` in place of the third. A new network
+    overrides `features`, `forward`, `loss` and `predict`, and says what it looks at (`needs`).
 
     Attributes
     ----------
@@ -116,6 +118,14 @@ class Network(nn.Module):
     def features(self, sensed: Sensed, sensor: SensorDescription) -> Tensor:
         """Input maps of `forward`, float32 [B, C, H, W], of frames that the sensor delivered."""
 
+    def as_trained_on(self, sensed: Sensed, draw: Draw) -> Sensed:
+        """Frames as they are shown in training; most networks are shown them as they are.
+
+        `draw` gives what is random in it: frame by frame, so that processes that share a batch
+        draw what one with the whole batch does.
+        """
+        return sensed
+
     def example(self, height: int, width: int) -> Tensor:
         """Features of a blank frame [1, C, H, W]."""
         blank = torch.zeros(1, height, width, device=next(self.parameters()).device)
@@ -134,10 +144,23 @@ class Network(nn.Module):
         sensor: SensorDescription,
         weights: LossWeights,
     ) -> Tensor:
-        """Scalar to be made small, from what `forward` gave; `weights` may go unused."""
+        """Scalar to be made small, from what `forward` gave.
 
-    def calibrate(self, batches: Iterable[tuple[Sensed, Truth]], sensor: SensorDescription) -> None:
-        """Fit what turns scores into probabilities, after training; most have nothing to fit."""
+        Means are over the whole batch, of which this may be a share: see `LossWeights.total`. The
+        other `weights` may go unused.
+        """
+
+    def calibrate(
+        self,
+        batches: Iterable[tuple[Sensed, Truth]],
+        sensor: SensorDescription,
+        pooled: Callable[[list], list] = list,
+    ) -> None:
+        """Fit what turns scores into probabilities, after training; most have nothing to fit.
+
+        Of processes that share the `batches` each has its own; `pooled` makes a list with an item
+        per batch that of all.
+        """
 
     @abstractmethod
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:

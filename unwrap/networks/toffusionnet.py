@@ -16,7 +16,7 @@ unit vector of its phase: where noise is strong, the neighbours' phase outweighs
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import ClassVar
 
@@ -28,7 +28,7 @@ from unwrap.depth import fit_temperature, nearest_wraps
 from unwrap.networks.autoencoder import Autoencoder, convolution, pad
 from unwrap.networks.input_maps import gray_maps, memory_maps, phase_maps
 from unwrap.networks.losses import IGNORED, LossWeights, masked_mean
-from unwrap.networks.network import Needs, Prediction, Settings, autocast
+from unwrap.networks.network import Draw, Needs, Prediction, Settings, autocast
 from unwrap.signal import Memory, Sensed, SensorDescription, Shots, Truth, wrapped_and_valid
 
 FEATURES = 9
@@ -96,24 +96,27 @@ class TofFusionNet(Autoencoder):
     def features(self, sensed: Sensed, sensor: SensorDescription) -> Tensor:
         """Maps of gray image, phase, amplitude, saturation and memory.
 
-        In training memory is partly withheld and spoilt (`spoil_memory`), so that the network does
-        not come to rely on it: drawn from torch's global generator, which training is to seed at
-        each step.
-
         Raises
         ------
         ValueError
             There are no samples.
         """
-        memory = sensed.memory
-        if memory is not None and self.training:
-            memory = spoil_memory(memory, self.settings.unambiguous_m)
         maps = (
             gray_maps(sensed.gray.unsqueeze(1)),
             phase_maps(sensed, sensor),
-            memory_maps(memory, sensed.gray, self.settings.range_m),
+            memory_maps(sensed.memory, sensed.gray, self.settings.range_m),
         )
         return torch.cat(maps, 1).contiguous(memory_format=torch.channels_last)
+
+    def as_trained_on(self, sensed: Sensed, draw: Draw) -> Sensed:
+        """With memory partly withheld and spoilt, so that the network does not come to rely on it.
+
+        See `spoil_memory`.
+        """
+        if sensed.memory is None:
+            return sensed
+        memory = spoil_memory(sensed.memory, self.settings.unambiguous_m, draw)
+        return replace(sensed, memory=memory)
 
     def loss(
         self,
@@ -137,12 +140,13 @@ class TofFusionNet(Autoencoder):
         # Summed and divided here: cross_entropy's own mean is NaN where no pixel is scored.
         wrap = functional.cross_entropy(
             candidates, wraps.masked_fill(~scored, IGNORED), reduction="sum"
-        ) / scored.sum().clamp(min=1)
-        coarse = masked_mean(knot_entropy(scores, truth.distance_m, unambiguous_m), truth.known)
+        ) / weights.total(scored.sum()).clamp(min=1)
+        unlikely = knot_entropy(scores, truth.distance_m, unambiguous_m)
+        coarse = masked_mean(unlikely, truth.known, weights.total)
         error_m = wrapped_m + wraps * unambiguous_m + correction_m - truth.distance_m
         # A distance that is clamped at the range is not the pixel's own, and has no error.
         unclamped = truth.distance_m < self.settings.range_m
-        fine = masked_mean(error_m.abs(), scored & unclamped)
+        fine = masked_mean(error_m.abs(), scored & unclamped, weights.total)
         return wrap + COARSE_WEIGHT * coarse + CORRECTION_WEIGHT * fine
 
     def parts(self, output: Tensor, wrapped_m: Tensor) -> tuple[Tensor, Tensor]:
@@ -171,7 +175,12 @@ class TofFusionNet(Autoencoder):
         return Prediction(torch.where(valid, corrected_m.clamp(min=0), coarse_m), confidence)
 
     @torch.no_grad()
-    def calibrate(self, batches: Iterable[tuple[Sensed, Truth]], sensor: SensorDescription) -> None:
+    def calibrate(
+        self,
+        batches: Iterable[tuple[Sensed, Truth]],
+        sensor: SensorDescription,
+        pooled: Callable[[list], list] = list,
+    ) -> None:
         """Fit `temperature` on frames that the network was not trained on.
 
         It is the one that gives the right wraps the greatest likelihood, one for 2 samples and one
@@ -181,8 +190,12 @@ class TofFusionNet(Autoencoder):
         """
         found: tuple[list, list] = ([], [])
         self.eval()
-        for sensed, truth in batches:
-            found[_temperature_index(sensed)].append(self._scored(sensed, truth, sensor))
+        scored = [
+            (_temperature_index(sensed), *self._scored(sensed, truth, sensor))
+            for sensed, truth in batches
+        ]
+        for index, *pair in pooled(scored):
+            found[index].append(pair)
         for index, pairs in enumerate(found):
             if pairs:
                 logits, wraps = (torch.cat(part) for part in zip(*pairs, strict=True))
@@ -280,20 +293,18 @@ def mean_distance_m(scores: Tensor, unambiguous_m: float) -> Tensor:
     return mean_m.clamp(max=(knots - 1) * apart_m * (1 - 1e-6))
 
 
-def spoil_memory(memory: Memory, unambiguous_m: float) -> Memory:
+def spoil_memory(memory: Memory, unambiguous_m: float, draw: Draw) -> Memory:
     """Memory as it is shown in training: nothing in some frames, and faults in the others.
 
     A share `FORGOTTEN` of the frames has none. Of the blocks of the others (`BLOCKS` to an image) a
     share `SPOILT` is erased, one is moved nearer by an unambiguous range and one farther, which is
-    how a memory of wrong wraps looks. Drawn from torch's global generator.
+    how a memory of wrong wraps looks. `draw` as for `Network.as_trained_on`.
     """
-    batch, height, width = memory.known.shape
-    device = memory.known.device
-    kept = (torch.rand(batch, 1, 1, device=device) >= FORGOTTEN).float()
+    kept = (draw(1, 1) >= FORGOTTEN).float()
     # One number decides what becomes of a block, so that none has two faults: below `SPOILT` it is
     # erased, below twice that moved nearer, in the last such share moved farther.
-    fate = torch.rand(batch, 1, *BLOCKS, device=device)
-    fate = functional.interpolate(fate, (height, width), mode="nearest").squeeze(1)
+    fate = draw(1, *BLOCKS)
+    fate = functional.interpolate(fate, memory.known.shape[-2:], mode="nearest").squeeze(1)
     known = memory.known * kept * (fate >= SPOILT).float()
     nearer = ((fate >= SPOILT) & (fate < 2 * SPOILT)).float()
     farther = (fate >= 1 - SPOILT).float()

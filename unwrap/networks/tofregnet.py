@@ -59,7 +59,9 @@ class TofRegNet(GrayNetwork):
             known=truth.known,
         )
         ours = wrap_loss(output, truth_m, self.settings.unambiguous_m)
-        return weights.equation_7 * paper + weights.wrap * ours
+        # Both are means over the images, which are of one size.
+        part = len(output) / weights.total(len(output))
+        return part * (weights.equation_7 * paper + weights.wrap * ours)
 
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         """The distance; its confidence is how far it lies from a wrap boundary.

@@ -48,8 +48,9 @@ class TofSegNet(GrayNetwork):
         weights: LossWeights,
     ) -> Tensor:
         """Cross entropy over the pixels of known truth."""
-        classes = wrap_classes(truth.distance_m, self.settings)
-        return functional.cross_entropy(output, classes.masked_fill(~truth.known, IGNORED))
+        classes = wrap_classes(truth.distance_m, self.settings).masked_fill(~truth.known, IGNORED)
+        unlikely = functional.cross_entropy(output, classes, reduction="sum")
+        return unlikely / weights.total(truth.known.sum()).clamp(min=1)
 
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         """A distance within the likeliest class (`class_depth_m`), and that class's probability."""

@@ -19,6 +19,7 @@ from .error_text import in_one_line as in_one_line
 from .files import (
     building_folder as building_folder,
     replacing as replacing,
+    unfinished as unfinished,
     write_bytes as write_bytes,
     write_json as write_json,
     write_text as write_text,

@@ -8,8 +8,11 @@ bit.
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import inspect
 import os
+import pickle
 import zlib
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -20,7 +23,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numba
 import numpy as np
+from numba.core.caching import FunctionCache
+from numba.core.serialize import dumps
 from numba.extending import register_jitable
+
+from unwrap.support.files import write_bytes
 
 if TYPE_CHECKING:  # Processes that render start without torch.
     from torch import Tensor
@@ -50,11 +57,68 @@ def loop(function: Function) -> Function:
     array([2., 2., 2.], dtype=float32)
     """
     # With Python's error model a division by zero raises, and every division is preceded by a test.
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
-    try:
-        return numba.njit(cache=True, **options)(function)
-    except RuntimeError:  # No folder can be written to: installed read-only, without a home.
-        return numba.njit(**options)(function)
+    compiled: Any = numba.njit(nogil=True, error_model="numpy")(function)
+    # Where no folder can be written to: installed read-only, without a home.
+    with contextlib.suppress(RuntimeError):
+        compiled._cache = CodeCache(function)
+    return compiled
+
+
+class CodeCache(FunctionCache):
+    """Numba's cache of the machine code of a function, in `CodeFiles`."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        # A number of its own for each version of the file in which the function stands.
+        version = self._impl.locator.get_source_stamp()
+        self._cache_file: Any = CodeFiles(Path(self.cache_path), self._impl.filename_base, version)
+
+
+class CodeFiles:
+    """Machine code of a function on disk: a file for each kind of arguments, known by its name.
+
+    Numba's own has an index of numbered files. A process that is killed after it wrote the index,
+    or reads between that of another and the file, takes what an earlier version of the function was
+    compiled to; and an index that names a class which has moved since cannot be read at all.
+
+    Parameters
+    ----------
+    folder : Path
+    stem : str
+        What names of the function's files begin with.
+    version : object
+        Of the function's source.
+    """
+
+    def __init__(self, folder: Path, stem: str, version: object) -> None:
+        self._folder, self._stem = folder, stem
+        self._version = _digest((numba.__version__, version))
+
+    def load(self, key: object) -> Any:
+        """What was kept for `key`; None where there is nothing that is of any use."""
+        try:
+            return pickle.loads(self._path(key).read_bytes())
+        # Missing, damaged, or of classes that have moved: whatever it is, it is compiled anew.
+        except Exception:
+            return None
+
+    def save(self, key: object, data: object) -> None:
+        """Keep `data`, and nothing of other versions; a disk that is full keeps nothing."""
+        with contextlib.suppress(OSError):
+            for path in self._folder.glob(f"{self._stem}.*.nbc"):
+                if not path.name.startswith(f"{self._stem}.{self._version}"):
+                    path.unlink(missing_ok=True)
+            write_bytes(self._path(key), dumps(data))
+
+    def flush(self) -> None:
+        """Nothing is remembered here."""
+
+    def _path(self, key: object) -> Path:
+        return self._folder / f"{self._stem}.{self._version}.{_digest(key)}.nbc"
+
+
+def _digest(told: object) -> str:
+    return hashlib.sha256(repr(told).encode()).hexdigest()[:16]
 
 
 def in_parts(function: Callable[[int, int], Any], count: int, *, least: int) -> list[Any]:

@@ -1,15 +1,21 @@
-"""Atomic files: written beside under a temporary name, flushed to disk, then renamed."""
+"""Atomic files: written beside under a hidden name, flushed to disk, then renamed."""
 
 from __future__ import annotations
 
 import json
 import os
+import platform
 import shutil
-import tempfile
+import uuid
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from glob import escape
 from pathlib import Path
 from typing import Any, BinaryIO
+
+LONGEST_NAME = 64
+"""Bytes of a name that its hidden form has; a file system takes 255 of the whole."""
 
 
 @contextmanager
@@ -22,18 +28,16 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         No space or no permission; nothing was overwritten.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    # In the same folder: a file can only be renamed within its file system.
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    writing = unfinished(path)
     try:
-        with os.fdopen(handle, "wb") as file:
+        with writing.open("xb") as file:
             yield file
             file.flush()
             # Without this a crash soon after the rename could leave an empty file under `path`.
             os.fsync(file.fileno())
-        Path(name).chmod(0o644)  # mkstemp makes files that only their owner may read.
-        Path(name).replace(path)
+        writing.replace(path)
     except BaseException:  # Ctrl-C, too, must leave nothing lying about.
-        Path(name).unlink(missing_ok=True)
+        writing.unlink(missing_ok=True)
         raise
 
 
@@ -49,14 +53,42 @@ def building_folder(folder: Path) -> Iterator[Path]:
     if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
         raise ValueError(f"{folder} is not an empty folder; nothing is written over")
     folder.parent.mkdir(parents=True, exist_ok=True)
-    # Beside it: a folder can only be renamed within its file system.
-    building = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+    building = unfinished(folder)
     try:
-        building.chmod(0o755)  # mkdtemp makes folders that only their owner may enter.
+        building.mkdir()
         yield building
         building.replace(folder)
     finally:
         shutil.rmtree(building, ignore_errors=True)
+
+
+def unfinished(path: Path) -> Path:
+    """A hidden name beside `path` for what becomes it when it is whole.
+
+    Beside it, since nothing can be renamed from one file system to another. What processes that
+    were killed have left under such names of `path` is deleted.
+    """
+    # The name tells machine and process: another machine that shares the folder knows nothing of
+    # the processes of this one.
+    own = os.fsdecode(os.fsencode(path.name)[:LONGEST_NAME])
+    stem = f".{own}.{zlib.crc32(platform.node().encode()):08x}-"
+    for left in path.parent.glob(f"{escape(stem)}*"):
+        process = left.name.removeprefix(stem).partition("-")[0]
+        if process.isdecimal() and not _is_running(int(process)):
+            shutil.rmtree(left, ignore_errors=True) if left.is_dir() else left.unlink(True)
+    return path.with_name(f"{stem}{os.getpid()}-{uuid.uuid4().hex[:8]}")
+
+
+def _is_running(process: int) -> bool:
+    if os.name != "posix":  # Elsewhere signal 0 is no question.
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # Somebody else's.
+        pass
+    return True
 
 
 def write_bytes(path: Path, content: bytes) -> None:

@@ -7,11 +7,11 @@ with the path, which the message around them begins with.
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import stat
 import sys
+from io import BufferedReader
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -21,7 +21,7 @@ MOST_JSON_BYTES = 1 << 24
 """Of tables that a person or a program reads at once; the largest of this project has some 4 MB."""
 
 
-def open_regular(path: Path, most_bytes: int = sys.maxsize) -> io.BufferedReader:
+def open_regular(path: Path, most_bytes: int = sys.maxsize) -> BufferedReader:
     """The open file `path`, without waiting for anybody.
 
     Raises

@@ -6,5 +6,7 @@ from .data import (
     loader as loader,
     training_device as training_device,
 )
-from .loop import JUDGED_DRAW as JUDGED_DRAW, train as train
+from .launch import is_first_process as is_first_process
+from .loop import train as train
+from .measuring import JUDGED_DRAW as JUDGED_DRAW
 from .splits import RANDOM_SPLITS as RANDOM_SPLITS, random_split as random_split

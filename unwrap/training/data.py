@@ -16,6 +16,7 @@ from torch.utils.data import DataLoader, Dataset, Sampler
 
 from unwrap.signal import Sensed, SensorDescription, Shots, Truth
 from unwrap.support import mapped
+from unwrap.training.ranks import ALONE, Ranks, Share
 
 SplitBy = Literal["clip", "frame"]
 Batch = tuple[Sensed, Truth]
@@ -64,13 +65,19 @@ class Augmentation:
     brightness: float
 
     def __call__(
-        self, sensed: Sensed, truth: Truth, *, generator: torch.Generator
+        self,
+        sensed: Sensed,
+        truth: Truth,
+        *,
+        generator: torch.Generator,
+        share: Share | None = None,
     ) -> tuple[Sensed, Truth]:
-        """Vary frames and their truth alike; fresh tensors."""
-        batch = len(sensed)
+        """Vary frames, all of a batch or a `share`, and their truth alike; fresh tensors."""
+        share = share or Share(len(sensed))
         # Drawn whether or not they are used, so that no option changes what the others draw.
-        sideways, upside = torch.rand(2, batch, generator=generator) < 0.5
-        exponent, factor = 2 * torch.rand(2, batch, generator=generator) - 1
+        sideways, upside = torch.rand(2, share.frames, generator=generator)[:, share.places] < 0.5
+        drawn = torch.rand(2, share.frames, generator=generator)[:, share.places]
+        exponent, factor = 2 * drawn - 1
         for wanted, chosen, axis in (
             (self.flip_horizontal, sideways, -1),
             (self.flip_vertical, upside, -2),
@@ -126,26 +133,34 @@ class Acquired(Dataset):
 class EpochShuffle(Sampler[Order]):
     """Batches of all frames in a new order each epoch, which depends on seed and epoch alone.
 
-    Each epoch is another draw of the source, and each batch has one of the `shots`.
+    Each epoch is another draw of the source, and each batch has one of the `shots`. Of processes
+    that share the batches each has its own frames of them.
     """
 
-    def __init__(self, frames: int, batch_size: int, shots: Sequence[Shots], seed: int):
+    def __init__(
+        self,
+        frames: int,
+        batch_size: int,
+        shots: Sequence[Shots],
+        seed: int,
+        ranks: Ranks = ALONE,
+    ):
         self.frames, self.batch_size, self.shots, self.seed = frames, batch_size, shots, seed
-        self.epoch = 0
+        self.ranks, self.epoch = ranks, 0
 
     def set_epoch(self, epoch: int) -> None:
         """Choose the order; the training loop calls this before each epoch."""
         self.epoch = epoch
 
     def __iter__(self) -> Iterator[Order]:
-        """This epoch's batches."""
+        """This epoch's batches, or what this process has of them."""
         # One stream for the order and then for each batch's samples: another batch size or choice
         # of samples deals the frames in the same order.
         generator = np.random.default_rng((self.seed, self.epoch))
         order = generator.permutation(self.frames).tolist()
         for start in range(0, self.frames, self.batch_size):
             shots = self.shots[int(generator.integers(len(self.shots)))] if self.shots else None
-            numbers = tuple(order[start : start + self.batch_size])
+            numbers = tuple(self.ranks.own(order[start : start + self.batch_size]))
             # Draw 0 is what networks are validated and tested on (`JUDGED_DRAW`).
             yield Order(numbers, self.epoch + 1, shots)
 

@@ -12,24 +12,20 @@ import signal
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
 import lightning
-import numpy as np
-import torch
 from lightning.pytorch.callbacks import ModelCheckpoint, TQDMProgressBar
 from lightning.pytorch.loggers import TensorBoardLogger
-from lightning.pytorch.utilities.types import OptimizerLRScheduler
-from torch import Tensor
+from lightning.pytorch.strategies import DDPStrategy
+from torch import distributed
 
-from unwrap.depth import nearest_wraps
-from unwrap.networks import Prediction, autocast, save_weights
-from unwrap.signal import Sensed, SensorDescription, Truth
+from unwrap.networks import save_weights
 from unwrap.support import keep_freed_memory, on_device, write_json
 from unwrap.training.config import TrainConfig
 from unwrap.training.data import (
-    Batch,
     EpochShuffle,
     Source,
     acquiring_threads,
@@ -37,13 +33,11 @@ from unwrap.training.data import (
     loader,
     training_device,
 )
-
-AUGMENTATION_STREAM = 1
-"""Word in the seed of the augmentation, so that it differs from other seeds of the same step."""
-FORWARD_STREAM = 2
-"""The same for what a network draws in its forward pass."""
-JUDGED_DRAW = 0
-"""Draw of the noise that networks are validated and tested on; no epoch of training sees it."""
+from unwrap.training.launch import Team, is_started, run_team
+from unwrap.training.measuring import JUDGED_DRAW, measure
+from unwrap.training.module import TrainingModule
+from unwrap.training.pooled_norm import PooledNorms
+from unwrap.training.ranks import Ranks
 
 LOGGED_PER_EPOCH = 50
 """Losses that TensorBoard is told of in an epoch; each makes a GPU wait for the processor."""
@@ -53,120 +47,12 @@ ADVICE = (
     ".*exists and is not empty.*",
     ".*Trying to infer the `batch_size`.*",
     ".*LeafSpec.* is deprecated.*",
+    ".*broadcast_buffers.* is deprecated.*",
 )
 """Lightning's warnings that do not fit here."""
 
-
-class TrainingModule(lightning.LightningModule):
-    """Network, loss, optimiser and schedule, as Lightning wants them."""
-
-    def __init__(self, config: TrainConfig, sensor: SensorDescription, steps: int):
-        super().__init__()
-        self.config, self.sensor, self.steps = config, sensor, steps
-        self.network = config.build().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
-
-    def forward(self, sensed: Sensed) -> Tensor:
-        """The network's output for a batch of frames."""
-        with autocast(sensed.gray.device):
-            return self.network(self.network.features(sensed, self.sensor))
-
-    def predict(self, sensed: Sensed) -> Prediction:
-        """Distance and confidence of a batch of frames."""
-        return self.network.predict(self(sensed), sensed, self.sensor)
-
-    def training_step(self, batch: Batch, _: int) -> Tensor:
-        """Loss of one augmented batch; all that is random in it follows from seed and step."""
-        generator = torch.Generator().manual_seed(self._seed_of(AUGMENTATION_STREAM))
-        sensed, truth = self.config.augmentation(*batch, generator=generator)
-        # Networks draw from the global generator (memory that is spoilt, say). Seeded by the step,
-        # a training that was resumed draws what one that was not interrupted does.
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(self._seed_of(FORWARD_STREAM))
-            weights = self.config.loss_weights
-            loss = self.network.loss(self(sensed), sensed, truth, self.sensor, weights)
-        self.log("loss", loss.detach(), prog_bar=True, batch_size=len(sensed))
-        return loss
-
-    def validation_step(self, batch: Batch, index: int) -> None:
-        """Wrap accuracy on validation frames, and a picture of the first of them."""
-        sensed, truth = batch
-        predicted_m = self.predict(sensed).distance_m
-        right, scored = wrap_hits(predicted_m, truth.distance_m, self.config)
-        accuracy = (right & truth.known).sum() / (scored & truth.known).sum().clamp(min=1)
-        # Lightning averages over batches, weighted by `batch_size`.
-        self.log("wrap_accuracy", accuracy, prog_bar=True, batch_size=len(sensed))
-        # The loader hands out the same frames each epoch: pictures can be compared.
-        if index == 0 and isinstance(self.logger, TensorBoardLogger):
-            depths = torch.cat((truth.distance_m[0], predicted_m[0]), dim=1) / self.config.clamp_m
-            picture = torch.cat((sensed.gray[0], depths.clamp(0, 1)), dim=1).float().cpu()
-            self.logger.experiment.add_image(
-                "gray, true and predicted depth", picture[None], self.current_epoch
-            )
-
-    def transfer_batch_to_device(
-        self, batch: Batch, device: torch.device, dataloader_idx: int
-    ) -> Batch:
-        """Lightning does not know how to move frozen dataclasses."""
-        return on_device(batch, device)
-
-    def _seed_of(self, stream: int) -> int:
-        """A seed for a purpose in this step, independent of those of other purposes and steps."""
-        words = (self.config.seed, stream, self.global_step)
-        # torch takes signed seeds: 63 of the 64 bits.
-        return int(np.random.SeedSequence(words).generate_state(1, np.uint64)[0] >> 1)
-
-    def configure_optimizers(self) -> OptimizerLRScheduler:
-        """AdamW; the rate rises linearly over the warm-up, then falls linearly to the end."""
-        config = self.config
-        optimizer = torch.optim.AdamW(
-            self.network.parameters(),
-            config.learning_rate,
-            weight_decay=config.weight_decay,
-            fused=True,  # A third of the time, which is a fifth of a step with few frames.
-        )
-        # One more than the warm-up: no step is taken at rate 0, which would teach nothing.
-        warmup = int(config.warmup_share * self.steps)
-        final = config.final_learning_rate / config.learning_rate
-
-        def factor(step: int) -> float:
-            if step < warmup:
-                return (step + 1) / (warmup + 1)
-            return 1 + (final - 1) * min(1.0, (step - warmup) / max(1, self.steps - warmup))
-
-        schedule = torch.optim.lr_scheduler.LambdaLR(optimizer, factor)
-        return {
-            "optimizer": optimizer,
-            "lr_scheduler": {"scheduler": schedule, "interval": "step"},
-        }
-
-    def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
-        """Note the configuration, so that no other one continues from here."""
-        checkpoint["train_config"] = self.config.model_dump_json()
-
-    def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:
-        """Refuse the checkpoint of another configuration."""
-        if checkpoint.get("train_config") != self.config.model_dump_json():
-            raise ValueError(
-                "the checkpoint was made with another configuration; start afresh with "
-                "resume=False, or write to another folder"
-            )
-
-
-def wrap_hits(predicted_m: Tensor, truth_m: Tensor, config: TrainConfig) -> tuple[Tensor, Tensor]:
-    """Pixels [B, H, W] in the right wrap, were the phase free of noise, and pixels that are scored.
-
-    The wrap is that of the nearest-candidate merge; scored is what lies within `max_range_m`.
-
-    Examples
-    --------
-    >>> truth_m = torch.tensor([10.0, 10.0, 29.0])
-    >>> wrap_hits(torch.tensor([13.0, 13.3, 29.0]), truth_m, TrainConfig())
-    (tensor([ True, False, False]), tensor([ True,  True, False]))
-    """
-    scored = truth_m <= config.max_range_m
-    unambiguous_m = config.settings.unambiguous_m
-    wraps = nearest_wraps(predicted_m, truth_m % unambiguous_m, unambiguous_m)
-    return scored & (wraps == (truth_m / unambiguous_m).floor()), scored
+PATIENCE = timedelta(minutes=10)
+"""How long a process waits for one that trains with it before it gives up (assumed)."""
 
 
 def train(
@@ -174,6 +60,8 @@ def train(
     sources: Callable[[str], Source],
     out: Path,
     *,
+    devices: int = 1,
+    nodes: int = 1,
     resume: bool = True,
     progress: bool = True,
 ) -> Path:
@@ -184,10 +72,18 @@ def train(
     config : TrainConfig
         What to train, and how.
     sources : callable
-        Gives the frames of the splits "train", "validation" and "test".
+        Gives the frames of the splits "train", "validation" and "test"; picklable where there are
+        several `devices`.
     out : Path
         Folder that gets `<network>.safetensors`, `<network>.json` with the numbers measured on the
         test frames, `<network>.ckpt`, the state after the last finished epoch, and `tensorboard/`.
+    devices : int
+        GPUs on this machine that share every batch, each with a process of its own; processes on
+        the processor where there is no GPU. The steps are those of one, but for rounding.
+    nodes : int
+        Machines that do so, which all call this function. Where a launcher like torchrun has not
+        started the processes they find each other by the environment variables MASTER_ADDR,
+        MASTER_PORT and NODE_RANK; `out` is a folder that all of them see.
     resume : bool
         Continue from `<network>.ckpt` where there is one.
     progress : bool
@@ -201,36 +97,78 @@ def train(
     Raises
     ------
     ValueError
-        The frames are unusable, or the checkpoint belongs to another configuration.
+        The frames are unusable, or cannot be shared by so many; the checkpoint belongs to another
+        configuration.
+    RuntimeError
+        One of several processes failed or died; the checkpoint is kept.
     KeyboardInterrupt
         Ctrl-C; the checkpoint is kept.
     """
+    team = Team(devices, nodes)
+    team.check(config.batch_size, len(sources("train")), training_device())
+    if team.alone or is_started():
+        _train(config, sources, out, team, resume, progress)
+    else:
+        run_team(team, _train, config, sources, out, team, resume, progress)
+    return out / f"{config.network}.safetensors"
+
+
+def _train(
+    config: TrainConfig,
+    sources: Callable[[str], Source],
+    out: Path,
+    team: Team,
+    resume: bool,
+    progress: bool,
+) -> None:
+    """What each process of a `team` does; the first alone writes."""
     frames, validation, device = sources("train"), sources("validation"), training_device()
     if device.type == "cpu":
         keep_freed_memory()  # For the rest of the process.
     shots, size = config.shown_shots, config.batch_size
-    order = EpochShuffle(len(frames), size, shots, config.seed)
+    steps = -(-len(frames) // size)
+    with _quiet_lightning():
+        trainer = _trainer(config, out, progress, steps, team)
+    ranks = Ranks(trainer.global_rank, trainer.world_size)
+    order = EpochShuffle(len(frames), size, shots, config.seed, ranks)
     judged = in_order(validation, size, shots, draw=JUDGED_DRAW)
-    module = TrainingModule(config, frames.sensor, steps=config.epochs * len(order))
+    module = TrainingModule(
+        config,
+        frames.sensor,
+        steps=config.epochs * steps,
+        ranks=ranks,
+        frames=len(frames),
+        judged=len(judged),
+    )
     checkpoint = out / f"{config.network}.ckpt"
     threads = acquiring_threads(device)
-    judging = loader(validation, judged, threads=threads)
+    judging = loader(validation, list(ranks.own(judged)), threads=threads)
+    # All processes validate equally often: who was dealt one batch less takes the first once more.
+    filled = judged + judged[:1] * (-len(judged) % ranks.processes)
     with _quiet_lightning(), _ctrl_c_raises():
-        _trainer(config, out, progress, len(order)).fit(
+        trainer.fit(
             module,
             loader(frames, order, threads=threads),
-            judging,
+            loader(validation, list(ranks.own(filled)), threads=threads),
             ckpt_path=str(checkpoint) if resume and checkpoint.is_file() else None,
             weights_only=True,  # Nothing in a checkpoint is unpickled.
         )
     # Confidences are calibrated on frames that the weights have not seen.
     module.eval().to(device)
-    module.network.calibrate((on_device(batch, device) for batch in judging), validation.sensor)
-    return _write(module, sources("test"), out)
+    batches = (on_device(batch, device) for batch in judging)
+    module.network.calibrate(batches, validation.sensor, ranks.pooled)
+    test = sources("test")
+    measured = measure(module, test)
+    if not ranks.alone:
+        distributed.destroy_process_group()
+    if ranks.rank == 0:
+        _write(module, test, measured, out)
 
 
-def _trainer(config: TrainConfig, out: Path, progress: bool, steps: int) -> lightning.Trainer:
-    """Lightning's trainer, for epochs of so many `steps`."""
+def _trainer(
+    config: TrainConfig, out: Path, progress: bool, steps: int, team: Team
+) -> lightning.Trainer:
+    """Lightning's trainer of a `team`, for epochs of so many `steps`."""
     # Without a monitored number the best is the last; without counted versions it has one name, by
     # which `train` finds it again.
     every_epoch = ModelCheckpoint(
@@ -248,23 +186,36 @@ def _trainer(config: TrainConfig, out: Path, progress: bool, steps: int) -> ligh
         log_every_n_steps=max(1, steps // LOGGED_PER_EPOCH),
         # Batches are of one size but for the last: it pays to try which convolution is fastest.
         benchmark=training_device().type == "cuda",
-        devices=1,
+        devices=team.devices,
+        num_nodes=team.nodes,
+        **({} if team.alone else _together()),
     )
+
+
+def _together() -> dict[str, Any]:
+    """What a trainer needs to know where several processes share each batch."""
+    # State that is not learned is the same everywhere as it is, since it follows from the whole
+    # batch: nothing has to be sent before each forward pass.
+    strategy = DDPStrategy(broadcast_buffers=False, timeout=PATIENCE)
+    # The batches are dealt already, see `EpochShuffle`.
+    return {"strategy": strategy, "plugins": [PooledNorms()], "use_distributed_sampler": False}
 
 
 @contextmanager
 def _quiet_lightning() -> Iterator[None]:
     """Silence Lightning's `ADVICE`, and what it logs below warnings, inside the context."""
-    log = logging.getLogger("lightning.pytorch")
-    level = log.level
+    logs = [logging.getLogger(f"lightning.{part}") for part in ("pytorch", "fabric")]
+    levels = [log.level for log in logs]
     with warnings.catch_warnings():
         for advice in ADVICE:
             warnings.filterwarnings("ignore", advice)
-        log.setLevel(logging.WARNING)
+        for log in logs:
+            log.setLevel(logging.WARNING)
         try:
             yield
         finally:
-            log.setLevel(level)
+            for log, level in zip(logs, levels, strict=True):
+                log.setLevel(level)
 
 
 @contextmanager
@@ -281,8 +232,8 @@ def _ctrl_c_raises() -> Iterator[None]:
         raise KeyboardInterrupt from None
 
 
-def _write(module: TrainingModule, test: Source, out: Path) -> Path:
-    """Write the weights, then the numbers measured with them."""
+def _write(module: TrainingModule, test: Source, measured: dict[str, Any], out: Path) -> None:
+    """Write the weights, then the numbers `measured` with them."""
     config = module.config
     path = out / f"{config.network}.safetensors"
     height, width = test.batch([0], draw=JUDGED_DRAW, shots=None)[0].gray.shape[-2:]
@@ -298,42 +249,5 @@ def _write(module: TrainingModule, test: Source, out: Path) -> Path:
         "config": config.model_dump(mode="json"),
     }
     save_weights(path, module.network, metadata)
-    numbers = {"config": config.model_dump(mode="json"), "test": measure(module, test)}
+    numbers = {"config": config.model_dump(mode="json"), "test": measured}
     write_json(path.with_suffix(".json"), numbers)
-    return path
-
-
-@torch.inference_mode()
-def measure(module: TrainingModule, source: Source) -> dict[str, Any]:
-    """Wrap accuracy and mean depth error of the prediction itself, in all and per family.
-
-    `wrap_accuracy` is that of the nearest-candidate merge without noise, `floor_wrap_accuracy` that
-    of eq. 6, `mae_m` the prediction's own error; all over pixels within the scored range, and over
-    all numbers of samples that the network was trained with.
-    """
-    config, device = module.config, training_device()
-    module = module.eval().to(device)
-    orders = in_order(source, 1, config.shown_shots, draw=JUDGED_DRAW)
-    judging = loader(source, orders, threads=acquiring_threads(device))
-    sums: dict[str, Tensor] = {}
-    for order, batch in zip(orders, judging, strict=True):
-        sensed, truth = on_device(batch, device)
-        counts = _counts(module.predict(sensed).distance_m, truth, config)
-        for key in (source.families[order.numbers[0]], "all"):
-            sums[key] = sums.get(key, torch.zeros(4, dtype=torch.float64)) + counts
-    # Sums of pixels, divided once at the end: frames with few scored pixels weigh little.
-    names = ("wrap_accuracy", "floor_wrap_accuracy", "mae_m")
-    shares = {key: (total[1:] / total[0]).tolist() for key, total in sums.items()}
-    families = {key: dict(zip(names, value, strict=True)) for key, value in shares.items()}
-    return {**families.pop("all"), "frames": len(source), "families": families}
-
-
-def _counts(predicted_m: Tensor, truth: Truth, config: TrainConfig) -> Tensor:
-    """Scored pixels, those in the right wrap by either merge, and the sum of errors."""
-    right, scored = (
-        pixels & truth.known for pixels in wrap_hits(predicted_m, truth.distance_m, config)
-    )
-    unambiguous_m = config.settings.unambiguous_m
-    floored = scored & (predicted_m // unambiguous_m == truth.distance_m // unambiguous_m)
-    error = ((predicted_m - truth.distance_m).abs() * scored).sum()
-    return torch.stack((scored.sum(), right.sum(), floored.sum(), error)).double().cpu()

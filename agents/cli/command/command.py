@@ -58,7 +58,7 @@ def add_config(parser: ArgumentParser, section: type[Section], default: str) -> 
     parser.add_class_arguments(section, None, sub_configs=True)
 
 
-def add_executor(parser: ArgumentParser, tasks: str) -> None:
+def add_executor(parser: ArgumentParser, tasks: str, default: str = "one per core") -> None:
     """`--executor` and `--workers`, see `execution_of`."""
     from unwrap.execution import Executor
 
@@ -69,7 +69,7 @@ def add_executor(parser: ArgumentParser, tasks: str) -> None:
         help="local: processes of this machine; ray: the cluster that RAY_ADDRESS names",
     )
     parser.add_argument(
-        "--workers", type=PositiveInt, metavar="N", help=f"{tasks} at a time; one per core"
+        "--workers", type=PositiveInt, metavar="N", help=f"{tasks} at a time; {default}"
     )
 
 

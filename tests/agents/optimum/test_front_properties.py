@@ -1,4 +1,4 @@
-"""Fronts, for whatever points: convex, falling, below every mixture; mixtures spend what they say."""
+"""Fronts, for whatever points: convex, falling, below mixtures, which spend what they say."""
 
 from __future__ import annotations
 

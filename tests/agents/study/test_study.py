@@ -261,7 +261,7 @@ def test_a_study_is_played_kept_and_measured(files, monkeypatch):
     assert one["probability"] + other["probability"] == pytest.approx(1.0)
 
 
-def test_jobs_run_in_processes_and_a_failure_keeps_the_others(files):
+def test_jobs_run_in_processes_and_a_failure_keeps_the_others(files, capsys):
     plan = plan_of(files, policies=["random"], ablations={}, seeds=[0])
     (references, random), out = jobs_of(plan), files / "out"
     # Where the folder of a job's result should be made there is a file.
@@ -270,6 +270,8 @@ def test_jobs_run_in_processes_and_a_failure_keeps_the_others(files):
     blocked = type(random)("blocked", "random", "random", random.config)
     with pytest.raises(ValueError, match="1 of 3 jobs failed, the others are kept: blocked/random"):
         job_runs.run_jobs([references, random, blocked], out, workers=2)
+    assert "blocked/random-0 failed" in (told := capsys.readouterr().err)
+    assert "; the others go on" in told
     assert set(read_result(out / references.name).fronts) == {"blind", "optimum"}
     assert read_result(out / random.name).fronts["front"].prices == (0.02, 0.09, 0.1)
 

@@ -141,7 +141,7 @@ def test_no_room_on_the_disk_is_said_before_rendering(config, tmp_path, monkeypa
 
 
 def test_folder_of_another_configuration_is_left_alone(config, tmp_path, monkeypatch):
-    monkeypatch.setattr(build_module, "_render", lambda *_: None)
+    monkeypatch.setattr(build_module, "render_clips", lambda *_: None)
     with pytest.raises(WorkerError, match="clips of this machine; expected a folder that all"):
         build_bank(config, tmp_path)
     other = merged(config, {"seed": 7})

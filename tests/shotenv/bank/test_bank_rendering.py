@@ -126,7 +126,7 @@ def test_a_deleted_clip_is_rendered_again(config, uninterrupted, tmp_path, monke
     """And here in this very process, after whatever else the renderer has done in it."""
     folder = shutil.copytree(uninterrupted, tmp_path / "bank")
     shutil.rmtree(folder / "clips" / clip_jobs(config, folder)[4].name)
-    monkeypatch.setattr(build_module, "_render", lambda jobs, *_: list(map(render_clip, jobs)))
+    monkeypatch.setattr(build_module, "render_clips", lambda jobs, *_: list(map(render_clip, jobs)))
     build_bank(config, folder)
     assert read_manifest(folder) == read_manifest(uninterrupted)
     assert verify(folder) == ()

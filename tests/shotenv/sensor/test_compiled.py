@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import pytest
 import torch
 
 from shotenv.decision.score import score_pixels_, sum_pixels_
 from shotenv.sensor import pixel_loops
+from unwrap.support import compiled
 from unwrap.support.compiled import array, loop
 
 ROWS, COLUMNS = 5, 19
@@ -92,14 +92,10 @@ def test_scores_and_features_are_those_of_the_python_loops(draw):
 
 
 def test_a_loop_is_compiled_where_nothing_can_be_kept(monkeypatch):
-    njit = numba.njit
+    def refusing(function):
+        raise RuntimeError("cannot cache function: no locator available")
 
-    def refusing(*args, cache=False, **options):
-        if cache:
-            raise RuntimeError("cannot cache function: no locator available")
-        return njit(*args, **options)
-
-    monkeypatch.setattr(numba, "njit", refusing)
+    monkeypatch.setattr(compiled, "CodeCache", refusing)
     doubled = loop(lambda number: number + number)
     assert doubled(np.float32(2.5)) == 5.0
 

@@ -101,29 +101,36 @@ def test_ray_that_is_not_installed_is_named_with_its_cure(monkeypatch):
 @pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGKILL])
 def test_no_worker_outlives_its_parent(ending, tmp_path):
     """Of a Ray of its own, which ends with it."""
-    parent = subprocess.Popen(
-        [sys.executable, worker_tasks.__file__, str(tmp_path), "ray"],
-        start_new_session=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    wait_until(lambda: len(list(tmp_path.iterdir())) == 2, seconds=60)
-    children = [int(path.name) for path in tmp_path.iterdir()]
-    daemons = [int(path.parent.name) for path in raylets_of(parent.pid)]
-    assert daemons
-    if ending == signal.SIGINT:
-        os.killpg(parent.pid, ending)
-    else:
-        parent.send_signal(ending)
-    told, _ = parent.communicate(timeout=60)
+    marks, log = tmp_path / "marks", tmp_path / "log"
+    marks.mkdir()
+    with log.open("w") as told:
+        parent = subprocess.Popen(
+            [sys.executable, worker_tasks.__file__, str(marks), "ray"],
+            start_new_session=True,
+            stdout=told,
+            stderr=told,
+        )
+    try:
+        wait_until(lambda: len(list(marks.iterdir())) == 2, seconds=60)
+        children = [int(path.name) for path in marks.iterdir()]
+        daemons = daemons_of(parent.pid)
+        assert daemons
+        if ending == signal.SIGINT:
+            os.killpg(parent.pid, ending)
+        else:
+            parent.send_signal(ending)
+        parent.wait(timeout=60)
+    finally:
+        print(log.read_text())
+        parent.kill()
+        parent.wait()
     wait_until(lambda: not any(map(is_alive, (*children, *daemons))))
     if ending == signal.SIGINT:
-        assert told.rstrip().endswith("KeyboardInterrupt")
+        assert log.read_text().rstrip().endswith("KeyboardInterrupt")
 
 
-def raylets_of(parent: int) -> list[Path]:
-    """Status files of the daemons that a process has started."""
+def daemons_of(parent: int) -> list[int]:
+    """Ray's own processes that a process has started."""
     found = []
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -131,7 +138,7 @@ def raylets_of(parent: int) -> list[Path]:
         except OSError:
             continue
         if int(rest.split()[1]) == parent and name in ("raylet", "gcs_server"):
-            found.append(path)
+            found.append(int(path.parent.name))
     return found
 
 

@@ -16,7 +16,8 @@ from unwrap.networks.sizes import trained_size
 from unwrap.networks.weight_files import save_weights
 from unwrap.signal.sensed import Truth
 from unwrap.training.config import TrainConfig
-from unwrap.training.loop import TrainingModule, train, wrap_hits
+from unwrap.training.loop import train
+from unwrap.training.module import TrainingModule, wrap_hits
 
 SMALL = TrainConfig(width=4, epochs=2, batch_size=4)
 

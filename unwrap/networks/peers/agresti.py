@@ -86,8 +86,9 @@ class AgrestiNet(Network):
         sensor: SensorDescription,
         weights: LossWeights,
     ) -> Tensor:
-        """Mean |error| over `range_m`; `weights` belong to the project's own loss."""
-        return masked_mean((output - truth.distance_m).abs(), truth.known) / self.settings.range_m
+        """Mean |error| over `range_m`; the terms' `weights` belong to the project's own loss."""
+        error_m = (output - truth.distance_m).abs()
+        return masked_mean(error_m, truth.known, weights.total) / self.settings.range_m
 
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         """The distance, in 0..range_m; its confidence: see `with_agreement`."""

@@ -61,15 +61,16 @@ class ChenNet(Autoencoder):
     ) -> Tensor:
         """1 - cos(phase error), and cross entropy of the wrap classes, over known pixels.
 
-        Truth that is clamped at the range has a class but no phase. `weights` belong to the
-        project's own loss.
+        Truth that is clamped at the range has a class but no phase. The terms' `weights` belong to
+        the project's own loss.
         """
         phase = truth.distance_m * (TWO_PI / self.settings.unambiguous_m)
         aligned = output[:, 0] * phase.cos() + output[:, 1] * phase.sin()
         unclamped = truth.known & (truth.distance_m < self.settings.range_m)
         classes = wrap_classes(truth.distance_m, self.settings)
         unlikely = functional.cross_entropy(output[:, 2:], classes, reduction="none")
-        return masked_mean(1 - aligned, unclamped) + masked_mean(unlikely, truth.known)
+        turned = masked_mean(1 - aligned, unclamped, weights.total)
+        return turned + masked_mean(unlikely, truth.known, weights.total)
 
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         """The noise-free phase's wrap candidate nearest to `class_depth_m`.

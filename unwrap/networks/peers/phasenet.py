@@ -70,11 +70,12 @@ class PhaseNet(Network):
         sensor: SensorDescription,
         weights: LossWeights,
     ) -> Tensor:
-        """Cross entropy over the pixels of known truth; `weights` are of the project's own loss."""
+        """Cross entropy over the pixels of known truth; the terms' `weights` are our own loss's."""
         # Counted from the measured phase, as the paper's: noise next to a wrap costs no whole one.
         wrapped_m = wrapped_distance_m(sensed, sensor)
         counts = true_wraps(truth.distance_m, wrapped_m, self.settings)
-        return masked_mean(functional.cross_entropy(output, counts, reduction="none"), truth.known)
+        unlikely = functional.cross_entropy(output, counts, reduction="none")
+        return masked_mean(unlikely, truth.known, weights.total)
 
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         """Likeliest count times the unambiguous range plus the wrapped distance.

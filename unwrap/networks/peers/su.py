@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import torch
@@ -17,6 +18,7 @@ from unwrap.networks import (
     convolution,
     doubling,
     masked_mean,
+    own,
     pad,
 )
 from unwrap.networks.peers.planes import PLANES, sample_planes, with_agreement
@@ -81,28 +83,29 @@ class SuNet(Network):
         sensor: SensorDescription,
         weights: LossWeights,
     ) -> Tensor:
-        """L1 over `range_m` and the smoothness term; `weights` belong to the project's own loss."""
+        """L1 over `range_m` and the smoothness term; the terms' `weights` are of our own loss."""
         prediction, target = (
             output / self.settings.range_m,
             truth.distance_m / self.settings.range_m,
         )
-        error = masked_mean((prediction - target).abs(), truth.known)
-        return error + SMOOTHNESS * smoothness(prediction, target, truth.known)
+        error = masked_mean((prediction - target).abs(), truth.known, weights.total)
+        return error + SMOOTHNESS * smoothness(prediction, target, truth.known, weights.total)
 
     def predict(self, output: Tensor, sensed: Sensed, sensor: SensorDescription) -> Prediction:
         """The distance; for its confidence see `with_agreement`."""
         return with_agreement(output, sensed, sensor)
 
 
-def smoothness(prediction: Tensor, target: Tensor, known: Tensor) -> Tensor:
+def smoothness(prediction: Tensor, target: Tensor, known: Tensor, total: Callable = own) -> Tensor:
     """Total variation of the prediction, damped by exp(-|step of the target|) at true edges.
 
-    Depths in units of the range; pairs with an unknown pixel do not count.
+    Depths in units of the range; pairs with an unknown pixel do not count. `total` as for
+    `masked_mean`.
     """
-    total = prediction.new_zeros(())
+    variation = prediction.new_zeros(())
     for axis in (-2, -1):
         step, true_step = prediction.diff(dim=axis).abs(), target.diff(dim=axis).abs()
         size = known.shape[axis] - 1
         both = known.narrow(axis, 0, size) & known.narrow(axis, 1, size)
-        total = total + masked_mean(step * torch.exp(-true_step), both)
-    return total
+        variation = variation + masked_mean(step * torch.exp(-true_step), both, total)
+    return variation

@@ -1,0 +1,70 @@
+"""Walls whose frames do not depend on the batch that they come in, for processes that share it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+
+import torch
+from unwrap_source import Walls
+
+from unwrap.signal import Memory, Sensed, Shots, Truth
+from unwrap.support import concatenate
+
+FRAMES = {"train": 10, "validation": 9, "test": 3}
+"""So that batches of four leave one of two frames, and two processes three validation batches."""
+
+
+class SharedWalls(Walls):
+    """Each frame has its own noise, memory and share of known pixels."""
+
+    def batch(
+        self, numbers: Sequence[int], *, draw: int, shots: Shots | None
+    ) -> tuple[Sensed, Truth]:
+        """The frames, each made for itself."""
+        return concatenate([self._frame(number, draw, shots) for number in numbers])
+
+    def _frame(self, number: int, draw: int, shots: Shots | None) -> tuple[Sensed, Truth]:
+        sensed, truth = super().batch([number], draw=draw, shots=shots)
+        generator = torch.Generator().manual_seed(number)
+        share = 0.2 + 0.1 * (number % 7)
+        known = torch.rand(truth.known.shape, generator=generator) < share
+        if shots is not None:
+            memory = Memory(truth.distance_m, torch.ones_like(truth.distance_m))
+            sensed = replace(sensed, memory=memory)
+        return sensed, replace(truth, known=known)
+
+
+def walls(split: str) -> SharedWalls:
+    """The frames of a split."""
+    return SharedWalls(FRAMES[split], seed=len(split))
+
+
+def precise_walls(split: str) -> SharedWalls:
+    """The same, where networks compute in float64 from now on, in the process that asks."""
+    torch.set_default_dtype(torch.float64)
+    return walls(split)
+
+
+def deadly_walls(split: str) -> SharedWalls:
+    """The same; the second of several processes is killed as it asks for the frames."""
+    if os.environ.get("LOCAL_RANK") == "1":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return walls(split)
+
+
+def train_two(out: str) -> None:
+    """Train on two processes for long, for a test that interrupts this one."""
+    from pathlib import Path
+
+    from unwrap.training import TrainConfig, train
+
+    config = TrainConfig(width=4, epochs=10_000, batch_size=4)
+    train(config, walls, Path(out), devices=2, progress=False)
+
+
+if __name__ == "__main__":
+    train_two(sys.argv[1])
