@@ -65,6 +65,9 @@ PROMISES = {
             "tests/shotenv/sensor/test_sensor.py",
             "tests/shotenv/config/test_env_config.py",
             "tests/shotenv/env/test_reset_options.py",
+            "tests/contract/test_public_arguments.py",
+            "tests/reliability/test_extreme_numbers.py",
+            "tests/agents/cli/test_outputs.py",
         ),
     ),
     7: Promise(
@@ -75,6 +78,8 @@ PROMISES = {
             "tests/shotenv/bank/test_bank.py",
             "tests/shotenv/bank/test_thinned.py",
             "tests/agents/policies/test_foreign_zips.py",
+            "tests/agents/policies/test_scheduler_files.py",
+            "tests/reliability/test_hostile_files.py",
             "tests/shotenv/scenes/test_mesh_refusals.py",
             "tests/shotenv/scenes/test_mitsuba_refusals.py",
             "tests/unwrap/cameras/files/test_bad_recordings.py",

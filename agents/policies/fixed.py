@@ -45,6 +45,8 @@ class RandomPolicy(Policy):
     """Each action with the same probability."""
 
     def __init__(self, seed: int = 0) -> None:
+        if not isinstance(seed, int | np.integer) or seed < 0:
+            raise ValueError(f"seed is {seed!r}; expected a whole number of at least 0")
         self._seed = seed
         self.reset()
 

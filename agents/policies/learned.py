@@ -33,6 +33,7 @@ from agents.policies.score_networks import (
     widths_of,
 )
 from shotenv.decision import FEATURE_NAMES
+from unwrap.support import require_path
 
 if TYPE_CHECKING:
     from stable_baselines3.common.policies import ActorCriticPolicy
@@ -159,6 +160,7 @@ def load_policy(path: str | Path, *, trust: bool = False) -> Scheduler:
         that is not trusted, or not of PPO, A2C, DQN or QR-DQN on the features of this environment.
         The message names the file.
     """
+    require_path(path=path)
     path = Path(path)
     if path.is_file():
         return _load_zip(path, trust=trust)

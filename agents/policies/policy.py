@@ -83,7 +83,7 @@ def checked_shots(shots: int) -> Shots:
     ValueError
         It is not 2, 4 or 8.
     """
-    if shots not in tuple(Shots):
+    if not isinstance(shots, int | np.integer) or shots not in tuple(Shots):
         raise ValueError(f"shots is {shots!r}; expected 2, 4 or 8")
     return Shots(shots)
 

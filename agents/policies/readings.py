@@ -5,6 +5,7 @@ The scales are those of the table of features (`shotenv.decision.FEATURES`).
 
 from __future__ import annotations
 
+import numbers
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -96,7 +97,7 @@ def checked_at_least(name: str, value: float, least: float) -> float:
     ValueError
         It is below `least`, or no number.
     """
-    if not value >= least:
+    if not isinstance(value, numbers.Real) or isinstance(value, bool) or not value >= least:
         raise ValueError(f"{name} is {value!r}; expected at least {least:g}")
     return value
 

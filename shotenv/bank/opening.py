@@ -19,6 +19,7 @@ from shotenv.bank.recorded_bank import RecordedBank
 from shotenv.bank.thinned import ThinnedBank
 from shotenv.config import BankConfig, ConfigError, find_config, read_config
 from unwrap.storage import is_url
+from unwrap.support import require_path
 
 
 def find_thinned(bank: str | Path) -> ThinnedBank | None:
@@ -29,6 +30,7 @@ def find_thinned(bank: str | Path) -> ThinnedBank | None:
     BankError
         It is damaged.
     """
+    require_path(bank=bank)
     if is_url(bank):
         bank = fetch_bank(str(bank))
     # A name is one part: SHIPPED / "/somewhere" would be somewhere.
@@ -61,6 +63,7 @@ def open_bank(bank: str | Path, *, render: bool = True) -> Bank:
     unwrap.storage.StorageError
         The place cannot be read, or what lies there is damaged.
     """
+    require_path(bank=bank)
     if is_url(bank):
         bank = fetch_bank(str(bank))
     # A folder first: who names a path means what lies there, not a configuration of that name.

@@ -270,6 +270,12 @@ def feature_index(feature_names: Sequence[str], name: str) -> int:
     ValueError
         There is no such feature.
     """
+    if not isinstance(feature_names, list | tuple) or not all(
+        isinstance(one, str) for one in feature_names
+    ):
+        raise TypeError(
+            f"feature_names is {type(feature_names).__name__}; expected a list or tuple of names"
+        )
     if name not in feature_names:
         raise ValueError(f"feature_names has no {name!r}; it has {', '.join(feature_names)}")
     return list(feature_names).index(name)

@@ -26,6 +26,7 @@ from unwrap.signal import (
     Shots,
     TurnsTable,
     angle_rad,
+    check_frames,
     decode_at,
     distance_m,
     is_strong,
@@ -34,7 +35,12 @@ from unwrap.signal import (
     samples_at,
     unambiguous_range_m,
 )
-from unwrap.support import array, array_of, can_loop, long_rows
+from unwrap.support import (
+    array,
+    array_of,
+    can_loop,
+    long_rows,
+)
 
 Eight = Literal["two_frequency", "kernel_density", "network"]
 """Who tells the wraps of eight samples, see `correct`."""
@@ -103,10 +109,11 @@ def correct(
     tensor([[[0.]]])
     tensor([[[6.2457]]])
     """
-    if merge not in RULES:
+    if not isinstance(merge, str) or merge not in RULES:
         raise ValueError(f"merge is {merge!r}; expected one of {', '.join(RULES)}")
     if eight not in get_args(Eight):
         raise ValueError(f"eight is {eight!r}; expected one of {', '.join(get_args(Eight))}")
+    check_frames(raw, predicted_m, sensor, offset_lsb, noise_lsb, shift_m)
     noise = sensor.noise_lsb if noise_lsb is None else noise_lsb
     calibration = _Calibration(sensor, offset_lsb, noise, shift_m)
     if raw.shots == Shots.EIGHT:

@@ -19,7 +19,7 @@ import torch
 from torch import Tensor
 
 from unwrap.signal import TurnsTable
-from unwrap.support import loop
+from unwrap.support import loop, require_floats, require_positive
 
 Array = np.ndarray
 Merge = Literal["nearest", "floor", "none"]
@@ -44,6 +44,8 @@ def merge_regression(
     predicted_m: Tensor, wrapped_m: Tensor, unambiguous_m: float, saturation_m: float
 ) -> Tensor:
     """Eq. 6: floor(d_p / d_u) d_u + d_M1 where d_M1 < d_sat, else d_p."""
+    require_floats(alike=True, predicted_m=predicted_m, wrapped_m=wrapped_m)
+    require_positive(unambiguous_m=unambiguous_m, saturation_m=saturation_m)
     wraps = predicted_m.mul(1 / unambiguous_m).floor_()
     return _add_wraps(wraps, wrapped_m, unambiguous_m, predicted_m, saturation_m)
 
@@ -55,6 +57,12 @@ def merge_segmentation(
 
     No line of `RULES`: distances within a class (`class_depth_m`) and "floor" say the same.
     """
+    if not isinstance(wraps, Tensor) or wraps.is_complex():
+        raise TypeError("wraps is no torch tensor of real numbers")
+    require_floats(wrapped_m=wrapped_m)
+    if wraps.shape != wrapped_m.shape:
+        raise ValueError(f"wraps has shape {tuple(wraps.shape)}; expected {tuple(wrapped_m.shape)}")
+    require_positive(unambiguous_m=unambiguous_m, saturation_m=saturation_m)
     return _add_wraps(wraps, wrapped_m, unambiguous_m, wraps * unambiguous_m, saturation_m)
 
 
@@ -76,6 +84,8 @@ def merge_nearest(
     >>> merge_regression(predicted_m, wrapped_m, 6.25, 6.2)
     tensor([0.1500])
     """
+    require_floats(alike=True, predicted_m=predicted_m, wrapped_m=wrapped_m)
+    require_positive(unambiguous_m=unambiguous_m, saturation_m=saturation_m)
     wraps = nearest_wraps(predicted_m, wrapped_m, unambiguous_m)
     return _add_wraps(wraps, wrapped_m, unambiguous_m, predicted_m, saturation_m)
 

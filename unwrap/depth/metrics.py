@@ -14,6 +14,8 @@ from collections.abc import Callable, Mapping
 import torch
 from torch import Tensor
 
+from unwrap.support import require_floats
+
 MIN_DEPTH_M = 0.1
 """Smallest depth used, metres."""
 
@@ -50,6 +52,9 @@ def depth_metrics(prediction_m: Tensor, truth_m: Tensor, valid: Tensor) -> dict[
     >>> round(metrics["mae_m"], 3), round(metrics["abs_rel"], 3)
     (0.5, 0.05)
     """
+    require_floats(prediction_m=prediction_m, truth_m=truth_m)
+    if not isinstance(valid, Tensor):
+        raise TypeError(f"valid is {type(valid).__name__}; expected a torch tensor of bool")
     if not (prediction_m.shape == truth_m.shape == valid.shape) or valid.ndim != 3:
         shapes = [tuple(tensor.shape) for tensor in (prediction_m, truth_m, valid)]
         raise ValueError(f"prediction_m, truth_m, valid are {shapes}; expected one shape [B, H, W]")

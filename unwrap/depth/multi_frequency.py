@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from unwrap.signal import SensorDescription, TurnsTable, distance_m, unambiguous_range_m
-from unwrap.support import loop
+from unwrap.support import loop, require_floats, require_positive
 
 Array = np.ndarray
 # float32, since a Python float would make the arithmetic of a loop float64.
@@ -133,21 +133,28 @@ def check_phases(
     phases_rad: Tensor | Sequence[Tensor], frequencies_hz: Sequence[float], max_range_m: float
 ) -> None:
     """Raise ValueError unless there are one to three phases, alike, and as many frequencies."""
+    if not isinstance(frequencies_hz, Sequence):
+        raise TypeError(
+            f"frequencies_hz is {type(frequencies_hz).__name__}; expected 1 to 3 numbers"
+        )
+    if not isinstance(phases_rad, Tensor | list | tuple):
+        raise TypeError(f"phases_rad is {type(phases_rad).__name__}; expected 1 to 3 tensors")
+    if isinstance(phases_rad, Tensor) and not phases_rad.ndim:
+        raise ValueError("phases_rad has no axes; expected [K, ..., H, W]")
     if not 1 <= len(frequencies_hz) <= 3 or len(phases_rad) != len(frequencies_hz):
         raise ValueError(
             f"phases_rad has {len(phases_rad)} phases and frequencies_hz {len(frequencies_hz)} "
             "frequencies; expected 1 to 3 of both"
         )
     for number, phase_rad in enumerate(phases_rad, 1):
+        require_floats(**{f"phase{number}_rad": phase_rad})
         if phase_rad.shape != phases_rad[0].shape:
             raise ValueError(
                 f"phase{number}_rad has shape {tuple(phase_rad.shape)}; expected that of "
                 f"phase1_rad, {tuple(phases_rad[0].shape)}"
             )
     named = {f"f{number}_hz": hz for number, hz in enumerate(frequencies_hz, 1)}
-    for name, value in (named | {"max_range_m": max_range_m}).items():
-        if not (value > 0 and math.isfinite(value)):
-            raise ValueError(f"{name} is {value}; expected a positive number")
+    require_positive(**named, max_range_m=max_range_m)
 
 
 def _wraps_of_two(

@@ -14,6 +14,8 @@ from typing import TypeVar
 import torch
 from torch import Tensor
 
+from unwrap.support import require_floats
+
 EQUATION_7 = (0.5, 0.4, 0.1)
 """Weights of the scale-invariant, similarity and depth-guided terms."""
 IGNORED = -100
@@ -63,6 +65,7 @@ def scale_invariant_loss(prediction: Tensor, truth: Tensor, mean_share: float = 
     >>> scale_invariant_loss(truth + 3, truth), scale_invariant_loss(truth + 3, truth, 0.85)
     (tensor(0.), tensor(1.3500))
     """
+    _require_maps(prediction, truth)
     difference = (truth - prediction).flatten(1)
     squares = difference.square().mean(1)
     return (squares - mean_share * difference.mean(1).square()).mean()
@@ -84,6 +87,7 @@ def depth_guided_loss(prediction: Tensor, truth: Tensor, known: Tensor | None = 
     >>> depth_guided_loss(truth + 4, truth, known)
     tensor(8.)
     """
+    _require_maps(prediction, truth)
     height, width = truth.shape[-2:]
     count = max(1, (width // 10) * (height // 10))
     ranked, difference = truth, truth - prediction
@@ -98,6 +102,7 @@ def ssim_loss(prediction: Tensor, truth: Tensor, data_range: float = 1.0) -> Ten
 
     Only windows that lie inside the image count; images smaller than 11 pixels raise ValueError.
     """
+    _require_maps(prediction, truth)
     if min(truth.shape[-2:]) < 11:
         raise ValueError(f"image is {tuple(truth.shape[-2:])}; the similarity window needs 11 x 11")
     # The constants of the paper, which keep the quotients from 0 / 0.
@@ -112,6 +117,12 @@ def ssim_loss(prediction: Tensor, truth: Tensor, data_range: float = 1.0) -> Ten
     luminance = (2 * mean_p * mean_t + c1) / (mean_p**2 + mean_t**2 + c1)
     structure = (2 * covariance + c2) / (variances + c2)
     return 1 - (luminance * structure).mean()
+
+
+def _require_maps(prediction: Tensor, truth: Tensor) -> None:
+    require_floats(alike=True, prediction=prediction, truth=truth)
+    if truth.ndim != 3 or not truth.numel():
+        raise ValueError(f"truth has shape {tuple(truth.shape)}; expected [B, H, W], not empty")
 
 
 def _windows(length: int, like: Tensor) -> Tensor:
@@ -136,6 +147,7 @@ def regression_loss(
     The paper scales depth maps to [0, 1]; `range_m` is the depth that becomes 1. Pixels that are
     not `known` (bool [B, H, W]) count as predicted rightly.
     """
+    require_floats(alike=True, prediction_m=prediction_m, truth_m=truth_m)
     if known is not None:
         truth_m = torch.where(known, truth_m, prediction_m.detach())
     prediction, truth = prediction_m / range_m, truth_m / range_m

@@ -15,7 +15,7 @@ from unwrap.networks.registry import PLACES
 from unwrap.networks.sizes import predict_thinned, stride_to, trained_size
 from unwrap.networks.weight_files import WeightsLabel, load_weights, read_label
 from unwrap.signal import GRAY_FULL_SCALE, Sensed, SensorDescription, unambiguous_range_m
-from unwrap.support import concatenate, mapped, torch_threads
+from unwrap.support import concatenate, mapped, require_path, torch_threads
 
 SHIPPED = Path(__file__).parents[1] / "weights"
 FRAMES_AT_ONCE = {"cpu": 1, "cuda": 64}
@@ -139,6 +139,8 @@ def gray_to_float(gray: Tensor) -> Tensor:
     ValueError
         Another shape, dtype or range, or NaN.
     """
+    if not isinstance(gray, Tensor):
+        raise TypeError(f"gray is {type(gray).__name__}; expected a torch tensor [B, H, W]")
     if gray.ndim != 3 or 0 in gray.shape:
         raise ValueError(f"gray has shape {tuple(gray.shape)}; expected [B, H, W], not empty")
     if gray.dtype == torch.uint16:
@@ -163,6 +165,7 @@ def load_unwrapper(name_or_path: str | Path) -> Unwrapper:
         The file is missing, damaged or no network of this project; the message names it and the
         cure.
     """
+    require_path(name_or_path=name_or_path)
     weights = load_weights(_weights_path(name_or_path))
     network = weights.network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     return Unwrapper(weights.metadata["network"], network, weights.metadata, weights.fingerprint)

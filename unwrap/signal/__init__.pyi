@@ -9,6 +9,7 @@ from .decoding import (
     quadratures as quadratures,
 )
 from .description import SensorDescription as SensorDescription
+from .frame_checks import check_frames as check_frames
 from .frames import DepthFrame as DepthFrame, PhaseFrame as PhaseFrame, RawFrame as RawFrame
 from .frequencies import (
     SPEED_OF_LIGHT_M_S as SPEED_OF_LIGHT_M_S,

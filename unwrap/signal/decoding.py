@@ -17,7 +17,7 @@ from torch import Tensor
 
 from unwrap.signal.frames import PhaseFrame
 from unwrap.signal.frequencies import unambiguous_range_m
-from unwrap.support import array, array_of, can_loop, long_rows, loop
+from unwrap.support import array, array_of, can_loop, long_rows, loop, require_floats
 
 Array = np.ndarray
 # float32, since a Python float would make the arithmetic of a loop float64.
@@ -47,6 +47,7 @@ def distance_m(phase_rad: Tensor, frequency_hz: float) -> Tensor:
     >>> distance_m(torch.tensor([0.0, torch.pi]), 24e6)
     tensor([0.0000, 3.1228])
     """
+    require_floats(phase_rad=phase_rad)
     return phase_rad * (unambiguous_range_m(frequency_hz) / TWO_PI)
 
 
@@ -128,10 +129,15 @@ def quadratures(
     Written twice: a compiled loop for samples on the processor, a chain of torch operations for
     other devices, gradients and exported files. A test holds them together.
     """
-    if not dcs.is_floating_point():
-        raise ValueError(f"dcs is {dcs.dtype}; expected a floating-point tensor")
+    require_floats(dcs=dcs)
     if dcs.ndim < 3 or dcs.shape[-3] not in (2, 4):
         raise ValueError(f"dcs has shape {tuple(dcs.shape)}; expected [..., 2 or 4, H, W]")
+    if offset_lsb is not None:
+        require_floats(offset_lsb=offset_lsb)
+        size = (*dcs.shape[:-3], *dcs.shape[-2:])
+        if tuple(offset_lsb.shape) != size[len(size) - offset_lsb.ndim :]:
+            shape = tuple(offset_lsb.shape)
+            raise ValueError(f"offset_lsb has shape {shape}; expected {size}, or its last axes")
     return _by_loop(dcs, offset_lsb) if can_loop(dcs) else _by_torch(dcs, offset_lsb)
 
 

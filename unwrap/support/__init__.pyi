@@ -1,4 +1,10 @@
 from .array_files import MAX_BYTES as MAX_BYTES, read_arrays as read_arrays
+from .checks import (
+    require_floats as require_floats,
+    require_not_negative as require_not_negative,
+    require_path as require_path,
+    require_positive as require_positive,
+)
 from .compiled import (
     array as array,
     array_of as array_of,

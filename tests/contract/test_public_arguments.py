@@ -1,0 +1,185 @@
+"""Every public function, given arguments of another kind, type, size or range: refused by name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+import agents
+import shotenv
+import unwrap
+from shotenv.decision import FEATURE_NAMES
+from unwrap.signal import RawFrame
+
+MAP, FOUR = torch.rand(1, 16, 16), torch.rand(1, 4, 16, 16)
+CLEAR = torch.zeros(1, 16, 16, dtype=torch.bool)
+RAW, SENSOR = RawFrame(FOUR, CLEAR), unwrap.SensorDescription()
+OTHER_KINDS = (
+    *(MAP.numpy(), None, "x", [1.0, 2.0], {}, object()),
+    *(MAP.to(torch.complex64), MAP.long(), torch.zeros(0), torch.rand(2, 2), torch.rand(2, 3, 5)),
+)
+NUMBERS = ("x", None, [1.0], MAP, float("nan"), -1.0, float("inf"))
+PATHS = (MAP, None, 3, [], b"x", object())
+
+
+def policy_cases():
+    """Each policy's features; parameters of those that have some."""
+    usual = {
+        "DistanceHysteresisPolicy": (0.2, 0.4),
+        "LookAndHoldPolicy": (8, 0.1),
+        "LookAndWeighPolicy": (8, 0.1),
+        "MotionPolicy": (1.0, 0.1, 0.1),
+        "SnrThresholdPolicy": (2.0,),
+        "UnsurePolicy": (0.5, 0.1),
+        "WakeOnChangePolicy": (0.1, 4),
+    }
+    for name, values in usual.items():
+        policy = getattr(agents, name)
+        for place, wrong in [(None, (None, "x", 3, MAP.numpy(), [1]))] + [
+            (place, ("x", None, [1.0], MAP, float("nan"), -1.0)) for place in range(len(values))
+        ]:
+
+            def call(value, policy=policy, place=place, values=values):
+                if place is None:
+                    return policy(value, *values)
+                return policy(FEATURE_NAMES, *values[:place], value, *values[place + 1 :])
+
+            yield pytest.param(call, wrong, id=f"{name}-{place}")
+
+
+def merge_cases():
+    for name in ("merge_nearest", "merge_regression", "merge_segmentation"):
+        merge, usual = getattr(unwrap, name), [MAP, MAP, 6.2, 6.0]
+        for place in range(4):
+
+            def call(value, merge=merge, place=place, usual=usual):
+                return merge(*usual[:place], value, *usual[place + 1 :])
+
+            kinds = OTHER_KINDS if place < 2 else NUMBERS
+            # Classes may be whole numbers.
+            some = [k for k in kinds if not (name == "merge_segmentation" and k is OTHER_KINDS[7])]
+            yield pytest.param(call, some, id=f"{name}-{place}")
+
+
+def loss_cases():
+    names = ("scale_invariant_loss", "depth_guided_loss", "ssim_loss", "regression_loss")
+    for name in names:
+        loss = getattr(unwrap, name)
+        yield pytest.param(lambda v, loss=loss: loss(v, MAP), OTHER_KINDS, id=f"{name}-prediction")
+        yield pytest.param(lambda v, loss=loss: loss(MAP, v), OTHER_KINDS, id=f"{name}-truth")
+
+
+CASES = [
+    pytest.param(call, wrong, id=name)
+    for name, call, wrong in (
+        (
+            "decode",
+            lambda v: unwrap.decode(v),
+            (*OTHER_KINDS[:-1], torch.full((4, 2, 2), torch.nan)),
+        ),
+        (
+            "decode-offset",
+            lambda v: unwrap.decode(FOUR, offset_lsb=v),
+            [kind for kind in OTHER_KINDS if kind is not None],
+        ),
+        ("distance_m", lambda v: unwrap.distance_m(v, 24e6), OTHER_KINDS[:8]),
+        ("correct-raw", lambda v: unwrap.correct(v, MAP, SENSOR), OTHER_KINDS),
+        (
+            "correct-samples",
+            lambda v: unwrap.correct(replace(RAW, dcs_lsb=v), MAP, SENSOR),
+            OTHER_KINDS,
+        ),
+        (
+            "correct-saturated",
+            lambda v: unwrap.correct(replace(RAW, saturated=v), MAP, SENSOR),
+            OTHER_KINDS,
+        ),
+        ("correct-prediction", lambda v: unwrap.correct(RAW, v, SENSOR), OTHER_KINDS),
+        ("correct-sensor", lambda v: unwrap.correct(RAW, MAP, v), OTHER_KINDS),
+        *(
+            (
+                f"correct-{name}",
+                lambda v, name=name: unwrap.correct(RAW, MAP, SENSOR, **{name: v}),
+                [kind for kind in OTHER_KINDS if kind is not None],
+            )
+            for name in ("offset_lsb", "shift_m", "merge", "eight")
+        ),
+        (
+            "correct-noise",
+            lambda v: unwrap.correct(RAW, MAP, SENSOR, noise_lsb=v),
+            (*OTHER_KINDS[2:], -1.0, float("nan"), -MAP, MAP * torch.nan),
+        ),
+        ("metrics", lambda v: unwrap.depth_metrics(v, MAP, ~CLEAR), OTHER_KINDS),
+        ("metrics-truth", lambda v: unwrap.depth_metrics(MAP, v, ~CLEAR), OTHER_KINDS),
+        ("metrics-valid", lambda v: unwrap.depth_metrics(MAP, MAP, v), OTHER_KINDS),
+        *(
+            (
+                f"unwrap_dual-{place}",
+                lambda v, place=place: unwrap.unwrap_dual(
+                    *[*(MAP, MAP, 24e6, 10e6)[:place], v, *(MAP, MAP, 24e6, 10e6)[place + 1 :]],
+                    max_range_m=25.0,
+                ),
+                OTHER_KINDS if place < 2 else NUMBERS,
+            )
+            for place in range(4)
+        ),
+        (
+            "unwrap_dual-range",
+            lambda v: unwrap.unwrap_dual(MAP, MAP, 24e6, 10e6, max_range_m=v),
+            NUMBERS,
+        ),
+        (
+            "unwrap_frequencies",
+            lambda v: unwrap.unwrap_frequencies(v, (24e6, 10e6), max_range_m=25.0),
+            OTHER_KINDS[:-2],  # The others are two phases.
+        ),
+        ("load_unwrapper", lambda v: unwrap.load_unwrapper(v), (*PATHS, "nowhere")),
+        ("load_policy", lambda v: agents.load_policy(v), (*PATHS, "nowhere")),
+        ("open_bank", lambda v: shotenv.open_bank(v, render=False), (*PATHS, "nowhere")),
+        ("env_config", lambda v: shotenv.env_config(v), (*PATHS, "nowhere")),
+        *(
+            (f"env-{name}", lambda v, name=name: shotenv.ShotScheduleEnv(**{name: v}), PATHS)
+            for name in ("bank", "sensor", "unwrapper", "reward", "split")
+            if name not in ("reward", "sensor")
+        ),
+        (
+            "vector",
+            lambda v: shotenv.ShotScheduleVectorEnv(num_envs=v),
+            (0, -1, 1.5, "x", None, MAP),
+        ),
+        ("TofRegNet", lambda v: unwrap.TofRegNet(width=v), (0, -1, 1.5, "x", None, 10**9)),
+        ("TofSegNet", lambda v: unwrap.TofSegNet(width=v), (0, -1, 1.5, "x", None, 10**9)),
+        ("FixedPolicy", lambda v: agents.FixedPolicy(v), (3, -1, "x", None, MAP, [2])),
+        ("CyclePolicy", lambda v: agents.CyclePolicy(v), (0, -1, 1.5, "x", None, MAP)),
+        ("RandomPolicy", lambda v: agents.RandomPolicy(v), (-1, 1.5, "x", None, MAP)),
+        ("MixturePolicy", lambda v: agents.MixturePolicy(v), ((1, 1, 1), "x", None, 3, MAP)),
+    )
+]
+
+
+@pytest.mark.parametrize(
+    ("call", "wrong"), [*CASES, *merge_cases(), *loss_cases(), *policy_cases()]
+)
+def test_wrong_arguments_are_refused_by_name(call, wrong):
+    for value in wrong:
+        with pytest.raises((TypeError, ValueError)) as caught:
+            call(value)
+        assert str(caught.value), value
+
+
+def test_a_network_of_gray_images_names_what_it_was_given():
+    unwrapper = unwrap.load_unwrapper("tofregnet")
+    for value, says in (
+        (np.zeros((1, 16, 16), np.float32), "gray is ndarray; expected a torch tensor"),
+        (None, "gray is NoneType"),
+        (torch.rand(16, 16), "gray has shape"),
+        (torch.zeros(1, 16, 16).to(torch.complex64), "gray is torch.complex64"),
+        (-MAP, "gray holds values outside 0..1"),
+        (MAP * torch.nan, "or NaN"),
+        (torch.zeros(0, 16, 16), "not empty"),
+    ):
+        with pytest.raises((TypeError, ValueError), match=says):
+            unwrapper.predict(value)

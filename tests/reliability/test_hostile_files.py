@@ -1,0 +1,24 @@
+"""Some changed files of each kind that is read; the measurement of that name takes a thousand."""
+
+from __future__ import annotations
+
+import pytest
+
+from reliability.hostile_files import tallied
+from reliability.hostile_kinds import KINDS
+
+SLOW = ("evaluation", "trusted", "recorded", "thinned", "XML", "Kinect")
+
+
+def kinds():
+    for kind in KINDS:
+        slow = any(word in kind.name for word in SLOW)
+        yield pytest.param(kind, 6 if slow else 20, id=kind.name.replace(" ", "-"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "count"), kinds())
+def test_changed_files_are_taken_or_refused_by_name(kind, count):
+    tally = tallied(kind, count)
+    assert tally.faults == []
+    assert tally.taken + tally.refused == count and tally.refused > 0

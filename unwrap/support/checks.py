@@ -1,0 +1,69 @@
+"""Arguments of public functions: another kind, type or size is refused by the argument's name."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+
+def require_floats(alike: bool = False, **values: Any) -> None:
+    """Raise TypeError unless all are tensors, ValueError unless of floats (and one shape).
+
+    Examples
+    --------
+    >>> require_floats(gray=[0.5])
+    Traceback (most recent call last):
+    ...
+    TypeError: gray is list; expected a torch tensor
+    """
+    import torch  # Not at the top: the configuration is checked without it.
+
+    shapes = {}
+    for name, value in values.items():
+        if not isinstance(value, torch.Tensor):
+            raise TypeError(f"{name} is {type(value).__name__}; expected a torch tensor")
+        if not value.is_floating_point():
+            raise ValueError(f"{name} is {value.dtype}; expected floating-point numbers")
+        shapes[name] = tuple(value.shape)
+    if alike and len(set(shapes.values())) > 1:
+        told = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+        raise ValueError(f"shapes differ: {told}; expected one shape")
+
+
+def require_positive(**values: Any) -> None:
+    """Raise TypeError unless all are numbers, ValueError unless they are finite and above 0."""
+    for name, value in values.items():
+        if not isinstance(value, numbers.Real) or isinstance(value, bool):
+            raise TypeError(f"{name} is {type(value).__name__}; expected a number")
+        if not (math.isfinite(value) and value > 0):
+            raise ValueError(f"{name} is {value}; expected a positive number")
+
+
+def require_not_negative(**values: Tensor | float) -> None:
+    """Raise ValueError unless all numbers, or those of tensors, are at least 0; NaN is refused."""
+    import torch
+
+    for name, value in values.items():
+        if isinstance(value, torch.Tensor):
+            require_floats(**{name: value})
+            good = not value.numel() or bool(value.amin() >= 0)
+        elif not isinstance(value, numbers.Real) or isinstance(value, bool):
+            raise TypeError(
+                f"{name} is {type(value).__name__}; expected a number or a torch tensor"
+            )
+        else:
+            good = value >= 0
+        if not good:
+            raise ValueError(f"{name} is negative or NaN; expected at least 0")
+
+
+def require_path(**values: Any) -> None:
+    """Raise TypeError unless all are paths, or names as strings."""
+    for name, value in values.items():
+        if not isinstance(value, str | Path):
+            raise TypeError(f"{name} is {type(value).__name__}; expected a path")
