@@ -85,7 +85,7 @@ def write_clip(
     except OSError as error:
         shutil.rmtree(temporary, ignore_errors=True)
         raise BankError(
-            f"cannot write {folder}: {error.strerror}; free space or choose another "
+            f"cannot write {folder}: {error.strerror or error}; free space or choose another "
             "cache folder with SHOTENV_CACHE"
         ) from None
     return record
