@@ -129,7 +129,11 @@ def of_disks(place: Path) -> list[Case]:
             [*render, "--out", place / "f1"],
             **{**full, "says": "requested and"},
         ),  # type: ignore[arg-type]
-        Case("full disk: train", [*train, "--out", place / "f2"], **full),  # type: ignore[arg-type]
+        Case(
+            "full disk: train",
+            [*train, "--out", place / "f2"],
+            **{**full, "says": "distance_m.npy: "},
+        ),  # type: ignore[arg-type]
         Case("full disk: unwrap train", [*network, *told, "--out", place / "f3"], **full),  # type: ignore[arg-type]
         Case(
             "cache that cannot be written: play",
