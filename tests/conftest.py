@@ -33,7 +33,9 @@ SPEED_OF_LIGHT_M_S = 299_792_458.0
 HEIGHT, WIDTH = 24, 32
 # Property tests draw the same examples each time, so that no run fails that passed before;
 # `--hypothesis-profile long` draws many more, anew each time.
-settings.register_profile("everyday", max_examples=60, derandomize=True, deadline=None, database=None)
+settings.register_profile(
+    "everyday", max_examples=60, derandomize=True, deadline=None, database=None
+)
 settings.register_profile("long", max_examples=10_000, deadline=None, database=None)
 settings.load_profile("everyday")
 CLIPS, FRAMES_PER_CLIP = 16, 4

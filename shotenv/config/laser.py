@@ -72,7 +72,7 @@ class LaserConfig(Section):
                 f"optical_power_w is {self.optical_power_w}; expected above 0 W and at most "
                 f"{MOST_W:g}"
             )
-        if not COLDEST_K <= self.ambient_k[0]:
+        if not self.ambient_k[0] >= COLDEST_K:
             raise ValueError(f"ambient_k is {self.ambient_k}; expected at least {COLDEST_K:g} K")
         # A laser that trips at an ambient above its release would never come back.
         if not self.ambient_k[1] < self.release_k < self.trip_k:

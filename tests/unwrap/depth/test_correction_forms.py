@@ -141,7 +141,7 @@ def test_other_values_take_the_array_operations():
     assert not correction._can_loop(raw, predicted_m.double())
     assert not correction._can_loop(raw, predicted_m.requires_grad_())
     assert not correction._can_loop(raw, predicted_m[0])
-    with pytest.raises(ValueError, match="raw.saturated has shape"):
+    with pytest.raises(ValueError, match=r"raw\.saturated has shape"):
         correct(RawFrame(raw.dcs_lsb[..., 1:], raw.saturated), predicted_m, SensorDescription())
 
 

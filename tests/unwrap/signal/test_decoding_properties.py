@@ -147,7 +147,7 @@ def test_a_shift_by_whole_wraps_changes_nothing(dcs, wraps, shift_m, frequency):
 @given(samples(4, 1e15), frequencies, st.sampled_from([2, 4]))
 def test_phases_lie_in_a_period_and_distances_in_a_range(dcs, frequency, count):
     frame = decode(dcs[:count])
-    assert 0 <= float(frame.phase_rad.min()) and float(frame.phase_rad.max()) <= BELOW_TWO_PI
+    assert float(frame.phase_rad.min()) >= 0 and float(frame.phase_rad.max()) <= BELOW_TWO_PI
     assert bool(frame.amplitude.isfinite().all()) and float(frame.amplitude.min()) >= 0
     metres = distance_m(torch.tensor([0.0, BELOW_TWO_PI]), frequency)
     assert metres[0] == 0 and float(metres[1]) <= unambiguous_range_m(frequency) * (1 + 1e-7)
@@ -156,7 +156,7 @@ def test_phases_lie_in_a_period_and_distances_in_a_range(dcs, frequency, count):
 @given(arrays(np.float32, PIXELS, elements=floats(-1e6, 1e6)))
 def test_a_wrapped_phase_lies_in_a_period(phase):
     wrapped = wrap_phase(torch.from_numpy(phase))
-    assert 0 <= float(wrapped.min()) and float(wrapped.max()) < TWO_PI
+    assert float(wrapped.min()) >= 0 and float(wrapped.max()) < TWO_PI
     # A float near 1e6 is exact to .06 rad; the wrapping adds no more than that.
     spacing = float(np.spacing(np.abs(phase).max()))
     assert turned(wrapped, phase) <= 2 * spacing + 1e-6
