@@ -10,6 +10,7 @@ virtual environment of its own. In a checkout
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -58,6 +59,7 @@ def main(
     out
         Folder of the scheduler.
     """
+    import ray
     from ray.rllib.algorithms.ppo import PPOConfig
     from ray.rllib.core.rl_module.default_model_config import DefaultModelConfig
 
@@ -98,6 +100,8 @@ def main(
             },
         )
     )
+    # Not whatever cluster was last started on this machine, unless it is asked for.
+    ray.init(address=os.environ.get("RAY_ADDRESS", "local"))
     algorithm = config.build_algo()
     for iteration in range(iterations):
         result = algorithm.train()
@@ -117,6 +121,7 @@ def main(
     )
     check(scheduler, module)
     algorithm.stop()
+    ray.shutdown()
     scheduler.save(out)
     print(f"The scheduler is in {out}")
     return mean

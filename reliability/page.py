@@ -36,6 +36,8 @@ PROMISES = {
             "tests/reliability/test_determinism.py",
             "tests/shotenv/env/test_env.py",
             "tests/shotenv/sensor/test_normals.py",
+            "tests/shotenv/laser/test_laser.py",
+            "tests/unwrap/support/test_kept_code.py",
         ),
     ),
     3: Promise(
@@ -95,6 +97,7 @@ PROMISES = {
             "tests/agents/training/test_recurrent_ppo.py",
             "tests/agents/training/test_regression.py",
             "tests/unwrap/training/test_training_loop.py",
+            "tests/unwrap/support/test_whole_files.py",
         ),
     ),
     9: Promise(
@@ -106,7 +109,8 @@ PROMISES = {
         "A dead or stuck worker is named within 10 s",
         "Killed, stopped or raising: the parent says which, leaves no process behind and does not hang.",
         (
-            "tests/shotenv/render/test_render.py",
+            "tests/unwrap/execution/test_processes.py",
+            "tests/agents/study/test_study.py",
             "tests/unwrap/support/test_parent_process.py",
         ),
     ),

@@ -72,7 +72,8 @@ def train_arguments(parser: ArgumentParser) -> None:
 
 def train(arguments: Namespace) -> int:
     """Train a scheduler, or one with each of several seeds."""
-    from agents.training import train_scheduler, train_seeds
+    from agents.study import train_seeds
+    from agents.training import train_scheduler
 
     config, execution = experiment_of(arguments), execution_of(arguments)
     if arguments.seeds is None and execution != {"executor": "local", "workers": None}:

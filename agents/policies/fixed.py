@@ -58,6 +58,9 @@ class RandomPolicy(Policy):
         """Draw the same numbers again."""
         self._generator = np.random.default_rng(self._seed)
 
+    def __str__(self) -> str:
+        return f"random, seed {self._seed}"
+
 
 class MixturePolicy(Policy):
     """Each action with a probability of its own, whatever is observed.

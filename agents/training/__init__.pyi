@@ -1,3 +1,2 @@
 from .sb3_vector import Sb3VecEnv as Sb3VecEnv
 from .scheduler import train_scheduler as train_scheduler
-from .seeds import train_seeds as train_seeds

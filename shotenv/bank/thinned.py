@@ -254,7 +254,9 @@ def write_thinned(
         write_thinned_contents(temporary, about)
         temporary.replace(folder)
     except OSError as error:
-        raise BankError(f"cannot write {folder}: {error.strerror}; choose another folder") from None
+        raise BankError(
+            f"cannot write {folder}: {error.strerror or error}; choose another folder"
+        ) from None
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
     return about

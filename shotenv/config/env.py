@@ -70,7 +70,7 @@ class EnvConfig(Section):
 
     sensor: SensorConfig
     laser: LaserConfig
-    bank: str = Field("pocket", description="name or path of a bank")
+    bank: str = Field("pocket", description="name, path or URL of a bank")
     split: Literal[Split, "all"] = Field(
         "train", description="clips that drives are made of; all: those of no held-out family"
     )

@@ -84,7 +84,9 @@ def import_bank(
         out.parent.mkdir(parents=True, exist_ok=True)
         temporary.replace(out)
     except OSError as error:
-        raise BankError(f"cannot write {out}: {error.strerror}; choose another folder") from None
+        raise BankError(
+            f"cannot write {out}: {error.strerror or error}; choose another folder"
+        ) from None
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
     return RecordedBank(out)

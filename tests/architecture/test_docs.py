@@ -141,7 +141,9 @@ def test_named_commands_exist(page):
     said = [words[len("shotenv ") :] for words in spoken(page) if words.startswith("shotenv ")]
     typed = re.findall(r"(?:^|\s)shotenv (.+)$", "\n".join(blocks(page, "console")), re.MULTILINE)
     assert [words for words in (*said, *typed) if not is_command(words)] == []
-    targets = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    targets = re.findall(
+        r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE
+    )
     made = [words.split()[1] for words in spoken(page) if words.startswith("make ")]
     assert set(made) <= set(targets)
 

@@ -36,8 +36,11 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
             # Without this a crash soon after the rename could leave an empty file under `path`.
             os.fsync(file.fileno())
         writing.replace(path)
-    except BaseException:  # Ctrl-C, too, must leave nothing lying about.
+    except BaseException as error:  # Ctrl-C, too, must leave nothing lying about.
         writing.unlink(missing_ok=True)
+        # That a disk is full is told without a name by those who write.
+        if isinstance(error, OSError) and error.filename is None:
+            raise OSError(error.errno, error.strerror or str(error), str(path)) from None
         raise
 
 

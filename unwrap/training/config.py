@@ -29,7 +29,7 @@ class TrainConfig(Section):
     """Training of an unwrapping network."""
 
     network: NetworkName = Field("tofregnet", description="which network")
-    bank: str = Field("training", description="name or path of the bank to train on")
+    bank: str = Field("training", description="name, path or URL of the bank to train on")
     split_by: SplitBy = Field(
         "clip", description="whole clips, or the paper's random split of frames"
     )

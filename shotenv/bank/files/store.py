@@ -85,7 +85,7 @@ def write_clip(
     except OSError as error:
         shutil.rmtree(temporary, ignore_errors=True)
         raise BankError(
-            f"cannot write {folder}: {error.strerror}; free space or choose another "
+            f"cannot write {folder}: {error.strerror or error}; free space or choose another "
             "cache folder with SHOTENV_CACHE"
         ) from None
     return record
@@ -137,10 +137,13 @@ def write_array(path: Path, array: np.ndarray) -> str:
 
 
 def _write_flushed(path: Path, write: Callable[[BinaryIO], object]) -> str:
-    with path.open("wb") as file:
-        write(file)
-        file.flush()
-        os.fsync(file.fileno())
+    try:
+        with path.open("wb") as file:
+            write(file)
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:  # NumPy's tells neither the file nor a number.
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from None
     return sha256_of(path)
 
 

@@ -273,7 +273,24 @@ def test_jobs_run_in_processes_and_a_failure_keeps_the_others(files, capsys):
     assert "blocked/random-0 failed" in (told := capsys.readouterr().err)
     assert "; the others go on" in told
     assert set(read_result(out / references.name).fronts) == {"blind", "optimum"}
-    assert read_result(out / random.name).fronts["front"].prices == (0.02, 0.09, 0.1)
+    played = read_result(out / random.name).fronts["front"]
+    assert played.prices == (0.02, 0.09, 0.1) and set(played.policies) == {"random, seed 0"}
+
+
+def test_what_is_played_elsewhere_waits_for_what_trains_it(transferred, tmp_path):
+    order = job_runs._Order([job_runs.JobTask(job, tmp_path, {}) for job in transferred])
+    tasks = order.tasks()
+    first = [next(tasks) for _ in range(4)]
+    assert {task.job.name for task in first} == {
+        *(f"short/{row}-0" for row in ("references", "fast", "snr_threshold")),
+        "heat/references-0",
+    }
+    assert next(tasks) is None
+    trained = next(task for task in first if task.job.name == "short/fast-0")
+    order.release(trained)
+    assert next(tasks).job.name == "heat/fast-0" and next(tasks) is None
+    order.release(next(task for task in first if task.job.name == "short/snr_threshold-0"))
+    assert [task.job.name for task in tasks] == ["heat/snr_threshold-0"]
 
 
 def test_a_learner_with_a_memory_is_a_job_like_the_others(files):

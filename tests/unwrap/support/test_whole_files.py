@@ -63,3 +63,10 @@ def test_a_failure_leaves_what_was_there(tmp_path):
 def test_odd_names_are_written(tmp_path, name):
     write_text(tmp_path / name, "whole")
     assert names(tmp_path) == [name]
+
+
+def test_a_full_disk_is_told_with_the_file(tmp_path):
+    path = tmp_path / "results.json"
+    with pytest.raises(OSError, match=r"No space left.*results\.json"), replacing(path):
+        raise OSError(28, "No space left on device")
+    assert names(tmp_path) == []

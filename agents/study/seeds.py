@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from agents.config import DemoConfig
-from agents.training.scheduler import train_scheduler
+from agents.training import train_scheduler
 from unwrap.execution import Executor, run_tasks, stderr_to, visible
 from unwrap.support import progress
 
