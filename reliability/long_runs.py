@@ -88,7 +88,7 @@ def of_frames(frames: int, place: Path, progress: Progress) -> Row:
     per_clip = min(FRAMES_PER_CLIP, frames // 4)
     small = write_small_bank_config(
         place,
-        camera={"width": 16, "height": 12, "samples_per_pixel": 1, "gray_instants": 1},
+        camera={"width": 16, "height": 16, "samples_per_pixel": 1, "gray_instants": 1},
         world={"frames_per_clip": per_clip, "families": ["garage"]},
         **{"train_clips": frames // per_clip, "validation_clips": 0, "test_clips": 0},
     )
@@ -114,7 +114,7 @@ def of_frames(frames: int, place: Path, progress: Progress) -> Row:
     curve = [memory[len(memory) * part // PARTS] for part in range(PARTS)]
     return Row(
         9,
-        f"{frames} frames of 16 x 12 pixels rendered, {per_clip} a clip, 2 workers",
+        f"{frames} frames of 16 x 16 pixels rendered, {per_clip} a clip, 2 workers",
         {
             "growth of the parent, MB": round(growth_mb, 2),
             "memory by twentieths, MB": [round(value, 1) for value in curve],
