@@ -86,7 +86,10 @@ def _rendered(folder: Path, executor: Executor) -> Pace:
 def study(executor: Executor) -> dict[str, Any]:
     """Cells of pure arithmetic on one worker and on two."""
     loops = _loops_of(CELL_S)
-    one, two = (pace(_count, [loops] * CELLS, executor, workers, threads=1) for workers in (1, 2))
+    one, two = (
+        pace(_count, [loops] * CELLS, executor, workers, threads=1, tasks_per_worker=CELLS)
+        for workers in (1, 2)
+    )
     note = (
         f"{CELLS} cells: {1e3 * one.task_s:.0f} ms a cell with one worker, "
         f"{1e3 * two.task_s:.0f} ms with two; the first after {two.start_s:.1f} s"
@@ -97,7 +100,11 @@ def study(executor: Executor) -> dict[str, Any]:
 
 def overhead() -> dict[str, Any]:
     """Tasks without work, one after the other."""
-    local, ray = (pace(_count, [0] * EMPTY_TASKS, executor, 1) for executor in ("local", "ray"))
+    empty = [0] * EMPTY_TASKS
+    local, ray = (
+        pace(_count, empty, executor, 1, tasks_per_worker=EMPTY_TASKS)
+        for executor in ("local", "ray")
+    )
     note = f"mean of {EMPTY_TASKS} tasks one after the other; local {1e3 * local.task_s:.2f} ms"
     return row("milliseconds of an empty task, Ray", 1e3 * ray.task_s, "<=", OVERHEAD_GOAL_MS, note)
 

@@ -27,7 +27,7 @@ from agents.study.jobs import REFERENCES, Job
 from agents.training import train_scheduler
 from shotenv.config import EnvConfig
 from shotenv.decision import open_problem
-from unwrap.execution import Executor, run_tasks, stderr_to, visible
+from unwrap.execution import Executor, output_to, run_tasks, visible
 from unwrap.support import progress, say
 
 JOBS_PER_WORKER = 1000
@@ -153,7 +153,7 @@ def run_job(task: JobTask) -> None:
     began, (job, folder, depends_on) = time.process_time(), task
     stem = visible(folder) / job.name
     stem.parent.mkdir(parents=True, exist_ok=True)
-    with stderr_to(stem.with_suffix(".log")):
+    with output_to(stem.with_suffix(".log")):
         config, arrays = job.config, {}
         if job.kind == REFERENCES:
             study = config.study

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from agents.config import DemoConfig
 from agents.training import train_scheduler
-from unwrap.execution import Executor, run_tasks, stderr_to, visible
+from unwrap.execution import Executor, output_to, run_tasks, visible
 from unwrap.support import progress
 
 
@@ -79,5 +79,5 @@ def train_seeds(
 def train_seed(task: SeedTask) -> None:
     """Train with one seed; bars and lines go to a file beside its folder."""
     visible(task.out.parent)
-    with stderr_to(task.out.with_suffix(".log")):
+    with output_to(task.out.with_suffix(".log")):
         train_scheduler(task.config, task.out)

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from unwrap.comparison.catalogue import NETWORKS
 from unwrap.comparison.compared_frames import OpenSplits
-from unwrap.execution import Executor, run_tasks, stderr_to, visible
+from unwrap.execution import Executor, output_to, run_tasks, visible
 from unwrap.networks import NetworkName, Unwrapper, load_unwrapper
 from unwrap.support import Positive, Section, progress, read_json, say
 from unwrap.training import TrainConfig, train
@@ -128,7 +128,7 @@ def train_one(task: TrainingTask) -> None:
 
 def train_with_log(task: TrainingTask) -> None:
     """As `train_one`; bars and lines go to a file beside the folder of the network."""
-    with stderr_to(visible(task.out) / f"{task.training.folder}.log"):
+    with output_to(visible(task.out) / f"{task.training.folder}.log"):
         train_one(task)
 
 

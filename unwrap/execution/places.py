@@ -27,7 +27,11 @@ def visible(folder: Path) -> Path:
 
 
 @contextlib.contextmanager
-def stderr_to(file: Path) -> Iterator[None]:
+def output_to(file: Path) -> Iterator[None]:
     """Bars and lines of one task among many go to a file, made anew."""
-    with file.open("w", encoding="utf-8") as log, contextlib.redirect_stderr(log):
+    with (
+        file.open("w", encoding="utf-8") as log,
+        contextlib.redirect_stderr(log),
+        contextlib.redirect_stdout(log),
+    ):
         yield

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 from PIL import Image
+from safetensors.torch import load_file
 
 from shotenv.bank.opening import open_bank
 from shotenv.config.keywords import env_config
@@ -168,6 +169,22 @@ def test_the_table_is_made_once_and_goes_on_where_it_stopped(tiny_bank, tmp_path
 
     monkeypatch.setattr("unwrap.comparison.table_trainings.train", never)
     assert make_table(config, sources, tmp_path) == rows
+
+
+@pytest.mark.slow
+def test_networks_are_the_same_trained_in_workers(tiny_bank, tmp_path):
+    config = TableConfig(bank=tiny_bank, width=4, epochs=1, batch_size=8, networks=("tofsegnet",))
+    only = {"only": ["tofsegnet"]}
+    assert make_table(config, sources, tmp_path / "here", **only) == []
+    assert make_table(config, sources, tmp_path / "there", **only, workers=2) == []
+    weights = sorted(
+        path.relative_to(tmp_path / "here") for path in (tmp_path / "here").rglob("*.safetensors")
+    )
+    assert len(weights) == 4
+    for path in weights:
+        here, there = (load_file(tmp_path / side / path) for side in ("here", "there"))
+        assert all(torch.allclose(here[name], there[name], atol=1e-5) for name in here)
+    assert len(list((tmp_path / "there").glob("*.log"))) == 4
 
 
 def test_an_unknown_network_is_named(tmp_path):
