@@ -5,7 +5,7 @@ virtual environment of its own. In a checkout
 
     python -m venv rllib && rllib/bin/pip install -r examples/rllib-requirements.txt .
     rllib/bin/python examples/rllib_ppo.py --iterations 20 --runners 2 --out runs/rllib
-    shotenv evaluate --policy runs/rllib --env.bank pocket
+    shotenv evaluate runs/rllib --env.bank pocket
 """
 
 from __future__ import annotations
