@@ -24,7 +24,12 @@ from shotenv.bank.files import (
     write_manifest,
 )
 from shotenv.config import BankConfig
-from shotenv.render.backend import RendererError, limit_threads, require_device
+from shotenv.render.backend import (
+    RendererError,
+    chosen_variant,
+    limit_threads,
+    require_device,
+)
 from unwrap.execution import Executor, WorkerError, available_cores, run_tasks
 from unwrap.signal import Shots
 from unwrap.storage import StorageError
@@ -171,6 +176,7 @@ def render_clips(jobs: Sequence[ClipJob], workers: int | None, executor: Executo
             jobs,
             executor=executor,
             workers=workers,
+            gpu=chosen_variant().startswith("cuda"),
             # A clip of more frames than that still has to be one worker's.
             tasks_per_worker=max(1, FRAMES_PER_WORKER // longest),
             prepare=limit_threads,

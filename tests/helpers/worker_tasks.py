@@ -63,6 +63,11 @@ def surroundings(_: int) -> tuple[list[int], str | None, str]:
     return _PREPARED, os.environ.get("SHOTENV_TEST"), str(Path.cwd())
 
 
+def gpus_seen(_: int) -> str | None:
+    """Numbers of the GPUs that this process may use."""
+    return os.environ.get("CUDA_VISIBLE_DEVICES")
+
+
 def killed_once(mark: str) -> str:
     """Dies at the first try, of which the file `mark` tells the second."""
     if not Path(mark).exists():

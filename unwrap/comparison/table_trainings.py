@@ -166,6 +166,7 @@ def train_missing(
                 missing,
                 executor=executor,
                 workers=workers,
+                gpu=True,
                 tasks_per_worker=1,
                 name=lambda task: f"training {task.training.folder}",
             ):

@@ -65,12 +65,16 @@ def run_on_ray(
 ) -> Generator[Done, None, None]:
     """Tasks as they finish; see `run_tasks`."""
     with _connected(workers) as ray:
-        cores = _cores(ray)
-        workers = workers or max(1, sum(cores) // (threads or 1))
+        cores, gpus = _held(ray, "CPU"), _held(ray, "GPU") if work.gpu else []
+        workers = workers or sum(gpus) or max(1, sum(cores) // (threads or 1))
         # No more than the smallest machine has: a task that fits nowhere would wait for ever.
         threads = threads or max(1, min(min(cores), sum(cores) // workers))
         remote = ray.remote(
-            num_cpus=threads, max_retries=TRIES - 1, max_calls=tasks_per_worker, name="shotenv"
+            num_cpus=threads,
+            num_gpus=1 if gpus else 0,
+            max_retries=TRIES - 1,
+            max_calls=tasks_per_worker,
+            name="shotenv",
         )(_by_value())
         packed = ray.cloudpickle.dumps((work, _surroundings(threads)))
         at_work: dict[Any, Any] = {}
@@ -138,19 +142,19 @@ def _surroundings(threads: int) -> Surroundings:
     return Surroundings(uuid.uuid4().hex, threads, str(Path.cwd()), own)
 
 
-def _cores(ray: Any) -> list[int]:
-    """Cores of each machine that has some.
+def _held(ray: Any, resource: str) -> list[int]:
+    """Cores ("CPU") or GPUs of each machine that has some.
 
     Raises
     ------
     ValueError
-        None has.
+        None has cores.
     """
     alive = [node["Resources"] for node in ray.nodes() if node["Alive"]]
-    cores = [int(resources.get("CPU", 0)) for resources in alive]
-    if not any(cores):
+    counts = [count for held in alive if (count := int(held.get(resource, 0)))]
+    if resource == "CPU" and not counts:
         raise ValueError(f"the Ray cluster has no cores on {len(alive)} machines; expected some")
-    return [count for count in cores if count]
+    return counts
 
 
 @contextmanager

@@ -22,6 +22,7 @@ def run_tasks(
     executor: Executor = "local",
     workers: int | None = None,
     threads: int | None = None,
+    gpu: bool = False,
     tasks_per_worker: int = 50,
     prepare: Callable[[int], None] | None = None,
     passing: tuple[type[Exception], ...] = (),
@@ -49,6 +50,9 @@ def run_tasks(
         Tasks at a time; by default one per core, of all machines together.
     threads : int, optional
         Cores that a task computes on; by default its share of them.
+    gpu : bool
+        Whether each task has a GPU of its own, on a cluster that has some. The processes of one
+        machine share what there is.
     tasks_per_worker : int
         After so many tasks a process is replaced by a new one: the renderer, for one, loses some
         memory with each scene.
@@ -79,7 +83,7 @@ def run_tasks(
         raise ValueError(
             f"executor is {executor!r}; expected one of {', '.join(get_args(Executor))}"
         )
-    work = Work(function, prepare, passing)
+    work = Work(function, prepare, passing, gpu)
     run = RUNNERS[executor](work, iter(tasks), workers, threads, tasks_per_worker)
     with closing(run):
         for task, (result, failure) in run:

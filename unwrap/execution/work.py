@@ -24,6 +24,7 @@ class Work:
     function: Callable[[Any], Any]
     prepare: Callable[[int], None] | None
     passing: tuple[type[Exception], ...]
+    gpu: bool = False
 
     def begin(self, threads: int) -> None:
         """In a worker, before its first task."""

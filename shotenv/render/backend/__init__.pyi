@@ -3,6 +3,7 @@ from .llvm import (
     CURE as CURE,
     OLDEST_LLVM as OLDEST_LLVM,
     RendererError as RendererError,
+    chosen_variant as chosen_variant,
     find_llvm as find_llvm,
     limit_threads as limit_threads,
     require_device as require_device,
