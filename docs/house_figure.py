@@ -27,7 +27,7 @@ ROOT = Path(__file__).parents[1]
 IMAGE = Path(__file__).parent / "images" / "house.png"
 Points = tuple[tuple[float, float], ...]
 
-LEFT, RIGHT, LOW, HIGH = -40, 1036, 26, 996
+LEFT, RIGHT, LOW, HIGH = -40, 1036, -6, 996
 """The drawing's edges; one unit is a little less than a pixel of the README."""
 DOTS_PER_UNIT = 1.5
 CORRIDOR, ACTION, TEXT = "#a3195b", "#5f6975", "#1f2933"
@@ -55,12 +55,12 @@ class Floor(NamedTuple):
 FLOORS = {
     "agents": Floor(690, 886, 869, "#fdf1e2", "#a04e0e"),
     "shotenv": Floor(360, 678, 661, "#e8f5eb", "#1f6a45"),
-    "unwrap": Floor(34, 348, 51, "#e6f0fa", "#20588c"),
+    "unwrap": Floor(2, 348, 18, "#e6f0fa", "#20588c"),
 }
 # Lower and upper edges of the rows of rooms.
 TOP = (736, 852)
 BACK, FRONT = (530, 644), (412, 522)
-MAIN, CELLAR = (174, 298), (67, 166)
+MAIN, CELLAR = (174, 298), (34, 166)
 PLACES = {
     "agents.cli": Box(374, 626, 900, 954),
     "agents.cli.command": Box(424, 519, 926, 949),
@@ -84,8 +84,8 @@ PLACES = {
     "shotenv.render.surfaces": Box(196, 302, 452, 478),
     "shotenv.render.backend": Box(196, 302, 420, 446),
     "shotenv.bank": Box(320, 456, 516, BACK[1]),
-    "shotenv.bank.listing": Box(330, 446, 521, 543),
-    "shotenv.bank.files": Box(330, 446, 548, 570),
+    "shotenv.bank.listing": Box(390, 450, 521, 543),
+    "shotenv.bank.files": Box(326, 385, 521, 543),
     "shotenv.sensor": Box(320, 456, FRONT[0], 510),
     "shotenv.config": Box(490, 666, *BACK),
     "shotenv.dataset": Box(674, 818, *BACK),
@@ -103,14 +103,14 @@ PLACES = {
     "unwrap.networks.peers": Box(430, 614, 179, 202),
     "unwrap.depth": Box(632, 800, *MAIN),
     "unwrap.training": Box(808, 970, *MAIN),
-    "unwrap.ros": Box(30, 130, *CELLAR),
-    "unwrap.calibration": Box(138, 290, *CELLAR),
-    "unwrap.comparison": Box(298, 460, *CELLAR),
-    "unwrap.export": Box(468, 620, *CELLAR),
-    "unwrap.storage": Box(628, 680, *CELLAR),
-    "unwrap.pictures": Box(684, 748, *CELLAR),
-    "unwrap.execution": Box(756, 856, *CELLAR),
-    "unwrap.support": Box(862, 970, *CELLAR),
+    "unwrap.ros": Box(30, 118, *CELLAR),
+    "unwrap.calibration": Box(124, 238, *CELLAR),
+    "unwrap.comparison": Box(244, 372, *CELLAR),
+    "unwrap.export": Box(378, 496, *CELLAR),
+    "unwrap.storage": Box(502, 612, *CELLAR),
+    "unwrap.pictures": Box(618, 714, *CELLAR),
+    "unwrap.execution": Box(720, 844, *CELLAR),
+    "unwrap.support": Box(850, 970, *CELLAR),
 }
 """Where each room is drawn. Rooms on the frame's way touch the hallway of their floor."""
 

@@ -1,4 +1,4 @@
-"""Many tasks at a time: in processes of this machine, or on the machines of a Ray cluster."""
+"""Many tasks at a time, in processes of this machine or on a Ray cluster."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Folders at a URL (a bucket, a shared disk): published whole or not at all, fetched and checked.
+"""Folders at a URL, published whole or not at all.
 
     place.py        a folder at a URL: its files are read, written and listed through fsspec
     listing.py      which files something has, by the digest of what is in them

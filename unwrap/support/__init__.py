@@ -1,4 +1,4 @@
-"""Tools that know nothing of light: whole files, compiled loops, tensors, threads, progress."""
+"""Tools that know nothing of light: files, compiled loops, tensors, progress."""
 
 import lazy_loader
 
