@@ -88,7 +88,7 @@ def _require_fitting(
     # Lightning reads it to mend checkpoints of its first version.
     if not isinstance(version, str) or not re.fullmatch(r"2(\.[0-9]{1,4}){2}\w{0,20}", version):
         raise _UnfitError("not of Lightning 2")
-    made = module.configure_optimizers()
+    made: Any = module.configure_optimizers()
     optimizer, schedule = made["optimizer"], made["lr_scheduler"]["scheduler"]
     parameters = list(module.network.parameters())
     states = found.get("optimizer_states")
