@@ -25,7 +25,6 @@ from torch import distributed
 
 from unwrap.networks import save_weights
 from unwrap.support import keep_freed_memory, on_device, write_json
-from unwrap.training.checkpoint import require_checkpoint, unusable
 from unwrap.training.config import TrainConfig
 from unwrap.training.data import (
     EpochShuffle,
@@ -40,6 +39,7 @@ from unwrap.training.measuring import JUDGED_DRAW, measure
 from unwrap.training.module import TrainingModule
 from unwrap.training.pooled_norm import PooledNorms
 from unwrap.training.ranks import Ranks
+from unwrap.training.resuming import require_checkpoint, unusable
 
 LOGGED_PER_EPOCH = 50
 """Losses that TensorBoard is told of in an epoch; each makes a GPU wait for the processor."""
