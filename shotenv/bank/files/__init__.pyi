@@ -1,4 +1,4 @@
-from .damage import cure_for as cure_for
+from .damage import cure_for as cure_for, require_place as require_place
 from .folders import (
     SHIPPED as SHIPPED,
     SOURCE as SOURCE,
@@ -36,7 +36,6 @@ from .store import (
     read_manifest as read_manifest,
     read_recorded_contents as read_recorded_contents,
     read_thinned_contents as read_thinned_contents,
-    require_place as require_place,
     sha256_of as sha256_of,
     verify as verify,
     write_array as write_array,

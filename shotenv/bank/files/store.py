@@ -18,7 +18,12 @@ from typing import Any, BinaryIO, TypeVar
 import numpy as np
 from pydantic import ValidationError
 
-from shotenv.bank.files.damage import check_header, check_packed, cure_for
+from shotenv.bank.files.damage import (
+    check_header,
+    check_packed,
+    cure_for,
+    require_place,
+)
 from shotenv.bank.files.layout import (
     ARRAYS,
     CLIP_RECORD,
@@ -107,25 +112,6 @@ def _publish(temporary: Path, folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def require_place(folder: Path) -> None:
-    """Refuse a clip's folder that holds something, but no record of a clip.
-
-    No rendering leaves one, and what is in it may be somebody's: it is not deleted.
-
-    Raises
-    ------
-    BankError
-        Names the folder and the cure.
-    """
-    if os.path.lexists(folder) and not (folder / CLIP_RECORD).is_file():
-        if folder.is_dir() and not any(folder.iterdir()):
-            return
-        raise BankError(
-            f"{folder} holds no {CLIP_RECORD}; delete it or move it away, and run `shotenv render` "
-            "again"
-        )
 
 
 def _checked_shape(arrays: Mapping[str, np.ndarray]) -> tuple[int, int, int]:
