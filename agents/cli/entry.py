@@ -80,14 +80,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _format_warning(
     message: Warning | str,
     category: type[Warning],
-    file: str,
-    line_number: int,
+    filename: str,
+    lineno: int,
     line: str | None = None,
 ) -> str:
     """A warning of this program as a sentence; others as Python tells them."""
     if category.__module__.partition(".")[0] in OWN_PACKAGES:
         return f"shotenv: warning: {message}\n"
-    return USUAL_FORMAT(message, category, file, line_number, line)
+    return USUAL_FORMAT(message, category, filename, lineno, line)
 
 
 def _refuse(sentence: str, status: int) -> int:
