@@ -274,6 +274,29 @@ def _read_checkpoint(path: Path) -> object:
     return _checkpoint_of(path.parent)[0].load(network.load_state_dict)
 
 
+def _network_training() -> tuple[Any, Any]:
+    from unwrap_source import Walls
+
+    from unwrap.training import TrainConfig
+
+    return TrainConfig(width=4, epochs=1, batch_size=1), lambda split: Walls(1)
+
+
+def _network_checkpoint(folder: Path) -> Path:
+    from unwrap.training import train
+
+    config, walls = _network_training()
+    train(config, walls, folder, progress=False)
+    return folder / "tofregnet.ckpt"
+
+
+def _read_network_checkpoint(path: Path) -> object:
+    from unwrap.training import train
+
+    config, walls = _network_training()
+    return train(config, walls, path.parent, progress=False)
+
+
 def _job(name: str) -> Callable[[Path], Path]:
     def make(folder: Path) -> Path:
         from agents.evaluation import PlayedFront
@@ -513,6 +536,7 @@ KINDS = (
     Kind("recurrent scheduler", _scheduler("agent.json", memory=True), _read_scheduler),
     Kind("trusted zip", _trained_zip, _read_zip),
     Kind("training's checkpoint", _checkpoint, _read_checkpoint),
+    Kind("network training's checkpoint", _network_checkpoint, _read_network_checkpoint, 0.1),
     Kind("study's result (JSON)", _job("job.json"), _read_job),
     Kind("study's result (npz)", _job("job.npz"), _read_job),
     Kind("evaluation's results", _report("results.json"), _read_report, 0.1),

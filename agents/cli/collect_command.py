@@ -73,7 +73,9 @@ def collect(arguments: Namespace) -> int:
 
 def rerun_arguments(parser: ArgumentParser) -> None:
     """Which file, which drive, who plays it, and the experiment."""
-    parser.add_argument("file", type=Path, help="recording to write, such as runs/drive.rrd")
+    parser.add_argument(
+        "rrd", metavar="FILE", type=Path, help="recording to write, such as runs/drive.rrd"
+    )
     parser.add_argument(
         "--policy", default="always_8", help="random, always_2, _4 or _8, or a scheduler's folder"
     )
@@ -97,9 +99,9 @@ def rerun(arguments: Namespace) -> int:
     frames, name = config.env.frames_per_drive, Path(arguments.policy).name
     with progress(frames, "writing the drive", "frame") as bar:
         write_recording(
-            arguments.file, problem, played, f"drive {arguments.seed}, {name}", tick=bar.update
+            arguments.rrd, problem, played, f"drive {arguments.seed}, {name}", tick=bar.update
         )
-    print(f"{frames} frames are in {arguments.file}; `rerun {arguments.file}` shows them.")
+    print(f"{frames} frames are in {arguments.rrd}; `rerun {arguments.rrd}` shows them.")
     known = {name: float(of[0]) for name, of in played.per_drive.items() if np.isfinite(of[0])}
     write_numbers(arguments, known)
     return DONE

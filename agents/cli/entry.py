@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+import warnings
 from collections.abc import Sequence
 from importlib.metadata import version
 
@@ -27,6 +28,8 @@ from agents.cli.cameras import CALIBRATE, CORRECT, DESCRIBE, RECORD
 from agents.cli.command import DONE, FAILED, INTERRUPTED, WRONG_USAGE, Command, check_outputs
 from shotenv.config import ConfigError, one_sentence
 
+OWN_PACKAGES = ("agents", "shotenv", "unwrap")
+USUAL_FORMAT = warnings.formatwarning
 HELP = ("--help", "-h", "help")
 COMMANDS: tuple[Command, ...] = (
     *doctor.COMMANDS,
@@ -47,6 +50,7 @@ COMMANDS: tuple[Command, ...] = (
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
     words = list(sys.argv[1:] if argv is None else argv)
+    before, warnings.formatwarning = warnings.formatwarning, _format_warning
     try:
         return _run(words)
     except SystemExit as leaving:  # argparse, after --help or --print_config
@@ -69,6 +73,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     # program and keeps its traceback.
     except (ValueError, RuntimeError) as error:
         return _refuse(one_sentence(error), FAILED)
+    finally:
+        warnings.formatwarning = before
+
+
+def _format_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    line: str | None = None,
+) -> str:
+    """A warning of this program as a sentence; others as Python tells them."""
+    if category.__module__.partition(".")[0] in OWN_PACKAGES:
+        return f"shotenv: warning: {message}\n"
+    return USUAL_FORMAT(message, category, filename, lineno, line)
 
 
 def _refuse(sentence: str, status: int) -> int:

@@ -77,7 +77,10 @@ class MixturePolicy(Policy):
     """
 
     def __init__(self, probabilities: Sequence[float], seed: int = 0) -> None:
-        shares = np.asarray(probabilities, dtype=np.float64)
+        try:
+            shares = np.asarray(probabilities, dtype=np.float64)
+        except (TypeError, ValueError):
+            shares = np.empty(0)  # Refused below by name.
         valid = shares.shape == (len(Shots),) and (shares >= 0).all()
         if not valid or abs(shares.sum() - 1.0) > 1e-9:
             raise ValueError(

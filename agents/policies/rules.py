@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -68,6 +69,9 @@ class SnrTwoThresholdPolicy(Policy):
         between: int = 4,
         above: int = 2,
     ) -> None:
+        for name, value in (("low", low), ("high", high)):
+            if not isinstance(value, numbers.Real):
+                raise TypeError(f"{name} is {type(value).__name__}; expected a number")
         if not low <= high:
             raise ValueError(f"low is {low!r} and high {high!r}; expected low <= high")
         self._index = feature_index(feature_names, SNR_FEATURE)

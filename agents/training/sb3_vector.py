@@ -29,6 +29,8 @@ class Sb3VecEnv(VecEnv):
     """
 
     def __init__(self, envs: VectorEnv) -> None:
+        if not isinstance(envs, VectorEnv):
+            raise TypeError(f"envs is {type(envs).__name__}; expected a vector of environments")
         # Under `NextStep` an ended drive takes one more step, whose action is ignored: a learner
         # would learn from it.
         mode = envs.metadata.get("autoreset_mode")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import time
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ from shotenv.bank.files import (
     frame_bytes,
     identity,
     read_clip_record,
+    require_place,
     was_rendered_from,
     write_manifest,
 )
@@ -73,7 +75,8 @@ def build_bank(
     Raises
     ------
     BankError
-        `folder` holds another bank, or the disk has no room.
+        `folder` holds another bank or a clip without its record, what tells which bank it is is
+        damaged, or the disk has no room.
     RendererError
         No usable LLVM library or GPU.
     WorkerError
@@ -96,6 +99,8 @@ def build_bank(
         _claim(folder, config)
         # Only now, under the lock: another process may have rendered them meanwhile.
         missing = [job for job in jobs if read_clip_record(job.folder) is None]
+        for job in missing:
+            require_place(job.folder)
         _announce(config, folder, len(jobs), missing)
         render_clips(missing, workers, executor)
         _delete_half_written(folder)
@@ -108,7 +113,7 @@ def build_bank(
 
 def _claim(folder: Path, config: BankConfig) -> None:
     """Mark the folder as this configuration's, or refuse when it is another's."""
-    if not (folder / SOURCE).is_file():
+    if not os.path.lexists(folder / SOURCE):
         if any((folder / CLIPS).iterdir()):
             raise BankError(f"{folder} holds clips of unknown origin; choose another folder")
         write_json(folder / SOURCE, identity(config))

@@ -17,7 +17,7 @@ def kinds():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "count"), kinds())
+@pytest.mark.parametrize(("kind", "count"), list(kinds()))
 def test_changed_files_are_taken_or_refused_by_name(kind, count):
     tally = tallied(kind, count)
     assert tally.faults == []

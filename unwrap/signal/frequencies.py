@@ -8,6 +8,8 @@ from __future__ import annotations
 import itertools
 import math
 
+from unwrap.support import require_positive
+
 SPEED_OF_LIGHT_M_S = 299_792_458.0
 GRID_HZ = 1000
 """Grid on which frequencies have a greatest common divisor; oscillators are no more exact."""
@@ -21,6 +23,7 @@ def unambiguous_range_m(frequency_hz: float) -> float:
     >>> round(unambiguous_range_m(24e6), 4)
     6.2457
     """
+    require_positive(frequency_hz=frequency_hz)
     return SPEED_OF_LIGHT_M_S / (2 * frequency_hz)
 
 

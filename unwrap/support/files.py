@@ -38,8 +38,9 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         writing.replace(path)
     except BaseException as error:  # Ctrl-C, too, must leave nothing lying about.
         writing.unlink(missing_ok=True)
-        # That a disk is full is told without a name by those who write.
-        if isinstance(error, OSError) and error.filename is None:
+        # That a disk is full is told without a name by those who write; errors of other kinds, such
+        # as that of a place which is read meanwhile, say what they are of.
+        if type(error) is OSError and error.filename is None:
             raise OSError(error.errno, error.strerror or str(error), str(path)) from None
         raise
 

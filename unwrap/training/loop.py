@@ -8,6 +8,7 @@ run that was not. TensorBoard shows it: loss, accuracy and pictures of every epo
 from __future__ import annotations
 
 import logging
+import os
 import signal
 import warnings
 from collections.abc import Callable, Iterator
@@ -38,6 +39,7 @@ from unwrap.training.measuring import JUDGED_DRAW, measure
 from unwrap.training.module import TrainingModule
 from unwrap.training.pooled_norm import PooledNorms
 from unwrap.training.ranks import Ranks
+from unwrap.training.resuming import require_checkpoint, unusable
 
 LOGGED_PER_EPOCH = 50
 """Losses that TensorBoard is told of in an epoch; each makes a GPU wait for the processor."""
@@ -97,8 +99,8 @@ def train(
     Raises
     ------
     ValueError
-        The frames are unusable, or cannot be shared by so many; the checkpoint belongs to another
-        configuration.
+        The frames are unusable, or cannot be shared by so many; the checkpoint is damaged or
+        belongs to another configuration.
     RuntimeError
         One of several processes failed or died; the checkpoint is kept.
     KeyboardInterrupt
@@ -140,17 +142,21 @@ def _train(
         frames=len(frames),
         judged=len(judged),
     )
-    checkpoint = out / f"{config.network}.ckpt"
+    path = out / f"{config.network}.ckpt"
+    # Whatever lies there, and be it a link to nowhere.
+    checkpoint = path if resume and os.path.lexists(path) else None
+    if checkpoint is not None:
+        require_checkpoint(checkpoint, module, trainer)
     threads = acquiring_threads(device)
     judging = loader(validation, list(ranks.own(judged)), threads=threads)
     # All processes validate equally often: who was dealt one batch less takes the first once more.
     filled = judged + judged[:1] * (-len(judged) % ranks.processes)
-    with _quiet_lightning(), _ctrl_c_raises():
+    with _quiet_lightning(), _ctrl_c_raises(), _restoring(checkpoint, module):
         trainer.fit(
             module,
             loader(frames, order, threads=threads),
             loader(validation, list(ranks.own(filled)), threads=threads),
-            ckpt_path=str(checkpoint) if resume and checkpoint.is_file() else None,
+            ckpt_path=None if checkpoint is None else str(checkpoint),
             weights_only=True,  # Nothing in a checkpoint is unpickled.
         )
     # Confidences are calibrated on frames that the weights have not seen.
@@ -216,6 +222,17 @@ def _quiet_lightning() -> Iterator[None]:
         finally:
             for log, level in zip(logs, levels, strict=True):
                 log.setLevel(level)
+
+
+@contextmanager
+def _restoring(checkpoint: Path | None, module: TrainingModule) -> Iterator[None]:
+    """Name the checkpoint in what is raised while it is taken over."""
+    try:
+        yield
+    except Exception as error:
+        if checkpoint is None or not module.restoring:
+            raise
+        raise unusable(checkpoint, error) from error
 
 
 @contextmanager

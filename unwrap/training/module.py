@@ -41,6 +41,11 @@ class TrainingModule(lightning.LightningModule):
     frames, judged : int
         Training frames and validation batches of all processes; where there is one alone its
         batches tell.
+
+    Attributes
+    ----------
+    restoring : bool
+        Whether a checkpoint is being taken over just now.
     """
 
     def __init__(
@@ -56,6 +61,7 @@ class TrainingModule(lightning.LightningModule):
         super().__init__()
         self.config, self.sensor, self.steps = config, sensor, steps
         self.ranks, self.frames, self.judged = ranks, frames, judged
+        self.restoring = False
         self.network = config.build().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def forward(self, sensed: Sensed) -> Tensor:
@@ -96,6 +102,7 @@ class TrainingModule(lightning.LightningModule):
 
     def on_train_start(self) -> None:
         """Refuse to train with processes that do not continue from the same step."""
+        self.restoring = False
         steps = self.ranks.pooled([self.global_step])
         if len(set(steps)) > 1:
             raise ValueError(
@@ -171,12 +178,10 @@ class TrainingModule(lightning.LightningModule):
         checkpoint["train_config"] = self.config.model_dump_json()
 
     def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:
-        """Refuse the checkpoint of another configuration."""
-        if checkpoint.get("train_config") != self.config.model_dump_json():
-            raise ValueError(
-                "the checkpoint was made with another configuration; start afresh with "
-                "resume=False, or write to another folder"
-            )
+        """Take network, optimiser, schedule and progress alone; see `require_checkpoint`."""
+        self.restoring = True
+        # Those of the callbacks name files, which would be deleted as older checkpoints.
+        checkpoint.pop("callbacks", None)
 
 
 def wrap_hits(predicted_m: Tensor, truth_m: Tensor, config: TrainConfig) -> tuple[Tensor, Tensor]:

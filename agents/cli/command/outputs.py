@@ -10,7 +10,7 @@ from jsonargparse import ArgumentParser, Namespace
 
 from shotenv.config import ConfigError
 
-OUTPUTS = ("json", "out", "page", "sheet", "mcap")
+OUTPUTS = ("json", "out", "page", "sheet", "mcap", "rrd")
 """Arguments that name what is written, in every command that has them: a file or, where their
 metavar says so, a folder."""
 FOLDERS = ("DIR", "FOLDER")

@@ -1,4 +1,4 @@
-from .damage import cure_for as cure_for
+from .damage import cure_for as cure_for, require_place as require_place
 from .folders import (
     SHIPPED as SHIPPED,
     SOURCE as SOURCE,

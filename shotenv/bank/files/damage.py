@@ -1,13 +1,15 @@
-"""Array files that are not what the table of contents says: refused by name, with the cure."""
+"""Files and folders that are not what a bank consists of: refused by name, with the cure."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
 
 from shotenv.bank.files.folders import fetched_banks
 from shotenv.bank.files.layout import (
+    CLIP_RECORD,
     MANIFEST,
     RECORDED_CONTENTS,
     THINNED_CONTENTS,
@@ -72,3 +74,22 @@ def check_packed(path: Path, frames: int) -> None:
     except (OSError, ValueError) as error:
         said = "no such file" if isinstance(error, FileNotFoundError) else str(error)
         raise BankError(f"{path} is missing or damaged ({said}); {cure_for(path)}") from None
+
+
+def require_place(folder: Path) -> None:
+    """Refuse a clip's folder that holds something, but no record of a clip.
+
+    No rendering leaves one, and what is in it may be somebody's: it is not deleted.
+
+    Raises
+    ------
+    BankError
+        Names the folder and the cure.
+    """
+    if os.path.lexists(folder) and not (folder / CLIP_RECORD).is_file():
+        if folder.is_dir() and not any(folder.iterdir()):
+            return
+        raise BankError(
+            f"{folder} holds no {CLIP_RECORD}; delete it or move it away, and run `shotenv render` "
+            "again"
+        )

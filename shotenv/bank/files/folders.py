@@ -8,8 +8,9 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from shotenv.bank.files.layout import BankError
 from shotenv.config import ACQUISITION_FIELDS, BankConfig
-from unwrap.support import read_json
+from unwrap.support import in_one_line, read_json
 
 RENDERING_VERSION = 4
 """Raised when the same configuration would give other light: old banks are then left alone."""
@@ -59,9 +60,20 @@ def identity(config: BankConfig) -> dict[str, Any]:
 
 
 def was_rendered_from(folder: Path, config: BankConfig) -> bool:
-    """Whether the bank in `folder`, finished or not, is that of `config`."""
+    """Whether the bank in `folder`, finished or not, is that of `config`.
+
+    Raises
+    ------
+    BankError
+        What tells it is damaged; names the file and the cure.
+    """
     path = folder / SOURCE
+    if not os.path.lexists(path):
+        return False
     try:
-        return path.is_file() and read_json(path) == identity(config)
-    except ValueError:
-        return False  # Damaged, it tells nothing.
+        return read_json(path) == identity(config)
+    except (OSError, ValueError) as error:
+        raise BankError(
+            f"{path} is damaged ({in_one_line(error)}); delete {folder} and render the bank again, "
+            "or choose another folder"
+        ) from None

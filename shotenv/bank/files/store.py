@@ -18,7 +18,12 @@ from typing import Any, BinaryIO, TypeVar
 import numpy as np
 from pydantic import ValidationError
 
-from shotenv.bank.files.damage import check_header, check_packed, cure_for
+from shotenv.bank.files.damage import (
+    check_header,
+    check_packed,
+    cure_for,
+    require_place,
+)
 from shotenv.bank.files.layout import (
     ARRAYS,
     CLIP_RECORD,
@@ -97,9 +102,10 @@ def _publish(temporary: Path, folder: Path) -> None:
         temporary.rename(folder)
     except OSError:
         # A worker that outlived its killed parent for a moment may have written the same clip.
+        shutil.rmtree(temporary)
+        require_place(folder)
         if not (folder / CLIP_RECORD).is_file():
             raise
-        shutil.rmtree(temporary)
     # The name is an entry of the folder above, which is flushed like a file.
     descriptor = os.open(folder.parent, os.O_RDONLY)
     try:
@@ -163,7 +169,10 @@ def write_manifest(
     size: tuple[int, int],
     config: BankConfig | None = None,
 ) -> Manifest:
-    """Write the table of contents; `size` is (height, width). This makes the bank complete."""
+    """Write the table of contents, with a digest of itself: this makes the bank complete.
+
+    `size` is (height, width).
+    """
     manifest = Manifest(
         name=name,
         height=size[0],
@@ -172,7 +181,7 @@ def write_manifest(
         clips=tuple(clips),
         units={key: spec.unit for key, spec in ARRAYS.items()},
     )
-    write_json(folder / MANIFEST, manifest.model_dump(mode="json"))
+    _write_contents(folder / MANIFEST, manifest)
     return manifest
 
 
@@ -192,7 +201,8 @@ def read_manifest(folder: Path) -> Manifest:
     Raises
     ------
     BankError
-        It is missing, not JSON, oversized, of another schema, or inconsistent.
+        It is missing, not JSON, oversized, of another schema, inconsistent, or not as it was
+        written; older ones, which have no digest of themselves, do not tell the last.
     """
     path = folder / MANIFEST
     if not path.is_file():
@@ -200,7 +210,7 @@ def read_manifest(folder: Path) -> Manifest:
             f"{folder} holds no {MANIFEST}: not a bank, or its rendering was cut off; "
             "run `shotenv render` to finish it"
         )
-    manifest = _validated(Manifest, _load_json(path), path)
+    manifest = _read_contents(Manifest, path, undigested=True)
     for clip in manifest.clips:
         for name, spec in ARRAYS.items():
             path = folder / clip.folder / array_file(name, manifest.storage)
@@ -253,8 +263,10 @@ def read_recorded_contents(folder: Path) -> RecordedContents:
     return contents
 
 
-def _read_contents(model: type[Contents], path: Path) -> Contents:
+def _read_contents(model: type[Contents], path: Path, *, undigested: bool = False) -> Contents:
     content = _load_json(path)
+    if undigested and "digest" not in content:
+        return _validated(model, content, path)
     if content.pop("digest", None) != _digest_of(content):
         raise BankError(f"{path} is damaged (not as it was written); {cure_for(path)}")
     return _validated(model, content, path)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
+
 import pytest
 from jsonargparse import ArgumentParser
 
 from agents.cli.command.outputs import FOLDERS, OUTPUTS
 from agents.cli.entry import COMMANDS, main
+from agents.policies.scheduler_files import UnboundSchedulerWarning
 
 
 def arguments_that_write():
@@ -29,6 +32,8 @@ def words_of(command, name, place):
             continue
         values = ["x"] * (action.nargs if isinstance(action.nargs, int) else 1)
         words += [*(action.option_strings[-1:]), *values] if action.option_strings else values
+    if any(action.dest == name and not action.option_strings for action in parser._actions):
+        return [*words, str(place)]
     return [*words, f"--{name}", str(place)]
 
 
@@ -70,3 +75,19 @@ def test_a_folder_without_permission_is_refused(tmp_path, capsys, monkeypatch):
     told = capsys.readouterr().err
     assert f"json is {tmp_path}/new/a.json, but {tmp_path} may not be written to" in told
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_warning_of_this_program_is_one_sentence(capsys, monkeypatch):
+    def warns(arguments):
+        for category in (UnboundSchedulerWarning, UserWarning):
+            print(warnings.formatwarning("agent.json has no digest", category, "a.py", 7), end="")
+        return 0
+
+    before = warnings.formatwarning
+    command = type(COMMANDS[0])(**vars(COMMANDS[0]) | {"action": warns})
+    monkeypatch.setattr("agents.cli.entry.COMMANDS", (command,))
+    assert main(command.words.split()) == 0
+    own, other = capsys.readouterr().out.splitlines()
+    assert own == "shotenv: warning: agent.json has no digest"
+    assert other == "a.py:7: UserWarning: agent.json has no digest"
+    assert warnings.formatwarning is before

@@ -201,6 +201,7 @@ def damage_json(folder):
 def damage_traversal(folder):
     content = json.loads((folder / "manifest.json").read_text())
     content["clips"][0]["folder"] = "clips/../../elsewhere"
+    del content["digest"]
     (folder / "manifest.json").write_text(json.dumps(content))
     return "manifest.json"
 
@@ -208,6 +209,7 @@ def damage_traversal(folder):
 def damage_schema(folder):
     content = json.loads((folder / "manifest.json").read_text())
     content["schema_version"] = 99
+    del content["digest"]
     (folder / "manifest.json").write_text(json.dumps(content))
     return "schema_version"
 
