@@ -157,6 +157,7 @@ room(
     "agents.study",
     *PLAYING,
     "unwrap.execution",
+    "unwrap.storage",
     "agents.evaluation",
     "agents.training",
 )
