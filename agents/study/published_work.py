@@ -85,8 +85,10 @@ class Shelf(NamedTuple):
             archive, ended = Path(scratch) / "unfinished.zip", threading.Event()
             self._unpack(there, archive, folder)
 
+            begun = _changed_at(folder)
+
             def keep() -> None:
-                kept = _changed_at(folder)
+                kept = begun
                 while not ended.wait(KEPT_EVERY_S):
                     if (now := _changed_at(folder)) != kept:
                         try:
