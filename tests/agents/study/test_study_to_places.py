@@ -9,6 +9,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+import yaml
 from cut_off_places import CutOffFileSystem
 from short_studies import plan_of
 
@@ -68,16 +69,16 @@ def arrays_of(folder: Path) -> dict[str, bytes]:
 
 
 def test_jobs_on_a_place_give_the_numbers_of_a_folder(files, url, monkeypatch):
-    names = ["short/random-0", "short/fast-0", "hot/fast-0"]
-    by_name = {job.name: job for job in studied(files)}
-    jobs, here, copy = [by_name[name] for name in names], files / "here", files / "copy"
+    jobs, here, copy = played(files), files / "here", files / "copy"
     job_runs.run_jobs(jobs, here)
     job_runs.run_jobs(jobs[:1], files / "begun", url=url)
     assert set(standing_parts(Place(url), "study")) == {"short/random-0"}
     run, ran = job_runs.run_job, []
     monkeypatch.setattr(job_runs, "run_job", lambda task: ran.append(task.job.name) or run(task))
     job_runs.run_jobs(jobs, copy, url=url)
-    assert ran[0::2] == names[1:], "each in a folder of its own, and what stands not again"
+    assert ran[0::2] == [job.name for job in jobs[1:]], (
+        "each in a folder of its own, and what stands not again"
+    )
     results = {name: content for name, content in arrays_of(here).items() if "npz" in name}
     assert arrays_of(copy) == results and len(results) == len(jobs)
     assert not list(copy.rglob("*.safetensors")), "schedulers stay where they are"
@@ -235,21 +236,32 @@ def test_one_training_wants_a_folder(tmp_path, capsys):
     assert f"out is file://{tmp_path}/x, a place: expected with --seeds" in capsys.readouterr().err
 
 
+def played(files) -> list[Job]:
+    """Chance, a scheduler, and the scheduler played elsewhere."""
+    by_name = {job.name: job for job in studied(files)}
+    return [by_name[name] for name in ("short/random-0", "short/fast-0", "hot/fast-0")]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("executor", ["local", "ray"])
-def test_the_command_with_workers(files, executor, capsys):
-    import yaml
+def test_workers_that_share_a_place_alone(files, executor, monkeypatch):
+    jobs, url = played(files), f"file://{files}/place"
+    job_runs.run_jobs(jobs, files / "copy", url=url, executor=executor, workers=2)
+    monkeypatch.setattr(job_runs, "run_tasks", run_here)
+    job_runs.run_jobs(jobs, files / "here")
+    results = {n: c for n, c in arrays_of(files / "here").items() if "npz" in n}
+    assert arrays_of(files / "copy") == results and len(results) == len(jobs)
 
+
+@pytest.mark.slow
+def test_the_command_gives_the_numbers_of_one_into_a_folder(files, monkeypatch, capsys):
+    monkeypatch.setattr(job_runs, "run_tasks", run_here)
     plan = transfer_plan(files, {"preset": str(files / "short.yaml")})
     file, url = files / "study.yaml", f"file://{files}/place"
     file.write_text(yaml.safe_dump(plan.model_dump(mode="json")))
     for out in (url, str(files / "here")):
-        words = ["study", str(file), "--out", out, "--executor", executor, "--workers", "2"]
-        assert main(words) == 0
+        assert main(["study", str(file), "--out", out]) == 0
     assert f"Numbers: results.json of {url}" in capsys.readouterr().out
-    place = Place(url)
-    fetch(place, read_contents(place), files / "fetched")
-    wanted = {n: c for n, c in arrays_of(files / "here").items() if "checkpoint" not in n}
-    assert arrays_of(files / "fetched") == wanted
+    fetch(Place(url), read_contents(Place(url)), files / "fetched")
     told = [json.loads((files / n / "results.json").read_text()) for n in ("fetched", "here")]
     assert {**told[0], "seconds": 0} == {**told[1], "seconds": 0}
