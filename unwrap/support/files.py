@@ -38,9 +38,10 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         writing.replace(path)
     except BaseException as error:  # Ctrl-C, too, must leave nothing lying about.
         writing.unlink(missing_ok=True)
-        # That a disk is full is told without a name by those who write.
-        if isinstance(error, OSError) and error.filename is None:
-            raise OSError(error.errno, error.strerror or str(error), str(path)) from None
+        # That a disk is full is told without a name by those who write. What has no number is an
+        # error of whoever gave the content, with words of its own.
+        if isinstance(error, OSError) and error.filename is None and error.errno is not None:
+            raise OSError(error.errno, error.strerror, str(path)) from None
         raise
 
 
