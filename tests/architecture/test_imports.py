@@ -176,6 +176,7 @@ room(
     "agents.cli.command",
     "unwrap.support",
     "unwrap.execution",
+    "unwrap.storage",
     "unwrap.depth",
     "shotenv.config",
     "shotenv.decision",
