@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from jsonargparse import ArgumentParser, Namespace
 from jsonargparse.typing import NonNegativeInt
@@ -14,6 +15,7 @@ from agents.cli.command import (
     add_executor,
     add_experiment,
     add_out,
+    add_out_or_url,
     add_trust,
     execution_of,
     experiment_of,
@@ -23,13 +25,17 @@ from agents.cli.command import (
 )
 from agents.config import DemoConfig
 from shotenv.config import ConfigError, read_config
+from unwrap.storage import Place
 from unwrap.support import say, write_json
 
 if TYPE_CHECKING:
+    from agents.config import StudyPlan
     from agents.evaluation import Evaluation
     from agents.policies import Scheduler
+    from agents.study import Job
 
 COMPARISON = Path("runs/comparison.html")
+RESULTS = "results.json"
 
 
 def demo_arguments(parser: ArgumentParser) -> None:
@@ -59,7 +65,7 @@ def run_demo(arguments: Namespace) -> int:
 def train_arguments(parser: ArgumentParser) -> None:
     """The experiment, and where the scheduler goes."""
     add_experiment(parser)
-    add_out(parser, "runs/agent", "folder of the scheduler and its checkpoint")
+    add_out_or_url(parser, "runs/agent", "folder of the scheduler and its checkpoint")
     parser.add_argument(
         "--seeds",
         type=NonNegativeInt,
@@ -78,6 +84,8 @@ def train(arguments: Namespace) -> int:
     config, execution = experiment_of(arguments), execution_of(arguments)
     if arguments.seeds is None and execution != {"executor": "local", "workers": None}:
         raise ConfigError("--executor and --workers: expected with --seeds alone")
+    if arguments.seeds is None and isinstance(arguments.out, str):
+        raise ConfigError(f"out is {arguments.out}, a place: expected with --seeds alone")
     prepare_bank(config.env)
     if arguments.seeds is not None:
         folders = train_seeds(config, arguments.seeds, arguments.out, **execution)
@@ -194,26 +202,42 @@ def study_arguments(parser: ArgumentParser) -> None:
     """Which study, where its jobs run, and where their results go."""
     parser.add_argument("file", type=Path, help="YAML file, such as configs/study/results.yaml")
     add_executor(parser, "jobs")
-    add_out(parser, "runs/study", "folder of the results of each job, and of results.json")
+    add_out_or_url(parser, "runs/study", "folder of the results of each job, and of results.json")
 
 
 def run_study(arguments: Namespace) -> int:
     """Run the jobs that do not stand yet, and measure what they played."""
     from agents.config import StudyPlan
-    from agents.study import jobs_of, make_leaderboard, run_jobs
+    from agents.study import jobs_of, publish_study
 
     plan = read_config(StudyPlan, arguments.file)
-    jobs = jobs_of(plan)
-    run_jobs(jobs, arguments.out, **execution_of(arguments))
-    found = make_leaderboard(plan, jobs, arguments.out)
-    write_json(arguments.out / "results.json", found)
+    jobs, out = jobs_of(plan), arguments.out
+    if isinstance(out, Path):
+        found = _played(plan, jobs, arguments, out)
+    else:
+        with tempfile.TemporaryDirectory() as copy:
+            found = _played(plan, jobs, arguments, Path(copy), url=out)
+            publish_study(out, jobs, Path(copy))
     for preset, table in found["presets"].items():
         print(f"\n{preset}: {table['best']} errs least at half the energy")
         for name, row in table["rows"].items():
             at_half, rewarded = row["error_at_half_energy"], row["return"]
             print(f"  {name:22}{at_half['iqm']:6.2f} m  return {rewarded['iqm']:8.1f}")
-    print(f"\nNumbers: {arguments.out / 'results.json'}")
+    where = out / RESULTS if isinstance(out, Path) else f"{RESULTS} of {Place(out).url}"
+    print(f"\nNumbers: {where}")
     return DONE
+
+
+def _played(
+    plan: StudyPlan, jobs: list[Job], arguments: Namespace, folder: Path, url: str | None = None
+) -> dict[str, Any]:
+    """The numbers of a study, of which `folder` has the results, and gets `results.json`."""
+    from agents.study import make_leaderboard, run_jobs
+
+    run_jobs(jobs, folder, url=url, **execution_of(arguments))
+    found = make_leaderboard(plan, jobs, folder)
+    write_json(folder / RESULTS, found)
+    return found
 
 
 COMMANDS = (

@@ -68,6 +68,17 @@ class JobResult:
     arrays: Mapping[str, np.ndarray]
 
 
+def beside(stem: Path, ending: str) -> Path:
+    """File of a job; what follows a dot in its name is no ending.
+
+    Examples
+    --------
+    >>> beside(Path("default/lr.3-0"), ".json").name
+    'lr.3-0.json'
+    """
+    return stem.with_name(stem.name + ending)
+
+
 def write_result(stem: Path, result: JobResult, depends_on: Mapping[str, Any]) -> None:
     """Write `stem`.npz, then `stem`.json."""
     arrays = {f"other/{name}": values for name, values in result.arrays.items()}
@@ -76,13 +87,13 @@ def write_result(stem: Path, result: JobResult, depends_on: Mapping[str, Any]) -
         arrays |= {f"{name}/{part}": getattr(front, part) for part in SUMS}
     content = io.BytesIO()
     np.savez_compressed(content, **arrays)  # type: ignore[arg-type]
-    write_bytes(stem.with_suffix(".npz"), content.getvalue())
+    write_bytes(beside(stem, ".npz"), content.getvalue())
     points = {
         name: {"prices": front.prices, "policies": front.policies}
         for name, front in result.fronts.items()
     }
     write_json(
-        stem.with_suffix(".json"),
+        beside(stem, ".json"),
         {
             "schema": RESULT_SCHEMA,
             "depends_on": depends_on,
@@ -100,7 +111,7 @@ def stands(stem: Path, depends_on: Mapping[str, Any]) -> bool:
     ValueError
         What is there is damaged, or of another schema or configuration; it is left as it is.
     """
-    path = stem.with_suffix(".json")
+    path = beside(stem, ".json")
     if not path.is_file():
         return False
     before = _described(path)["depends_on"]
@@ -125,8 +136,8 @@ def read_result(stem: Path) -> JobResult:
     ValueError
         It is missing, damaged or of another schema; the message names the file.
     """
-    told = _described(stem.with_suffix(".json"))
-    path = stem.with_suffix(".npz")
+    told = _described(beside(stem, ".json"))
+    path = beside(stem, ".npz")
     try:
         arrays = read_arrays(path, "")
         fronts = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -22,8 +23,15 @@ from agents.evaluation import (
     tune_families,
 )
 from agents.policies import RandomPolicy, Scheduler, load_policy
-from agents.study.job_results import JobResult, stands, write_result
+from agents.study.job_results import JobResult, beside, stands, write_result
 from agents.study.jobs import REFERENCES, Job
+from agents.study.published_jobs import (
+    fetch_result,
+    fetch_results,
+    fetch_scheduler,
+    publish_result,
+    training_kept,
+)
 from agents.training import train_scheduler
 from shotenv.config import EnvConfig
 from shotenv.decision import open_problem
@@ -35,17 +43,19 @@ JOBS_PER_WORKER = 1000
 
 
 class JobTask(NamedTuple):
-    """One job for a worker, which writes its result below `folder`."""
+    """One job for a worker, which writes its result below `folder`, or publishes it at `url`."""
 
     job: Job
     folder: Path
     depends_on: dict[str, Any]
+    url: str | None = None
 
 
 def run_jobs(
     jobs: Sequence[Job],
     folder: Path,
     *,
+    url: str | None = None,
     workers: int | None = None,
     executor: Executor = "local",
 ) -> None:
@@ -53,25 +63,32 @@ def run_jobs(
 
     Parameters
     ----------
+    url : str, optional
+        Place where results stand and are published; `folder`, an empty one, becomes a copy of
+        them, without schedulers and logs.
     workers : int, optional
         Jobs at a time; one per core by default.
     executor : "local" or "ray"
-        With "ray", on machines that all see `folder`, and the banks.
+        With "ray", on machines that all see `folder`, unless there is an `url`, and the banks.
 
     Raises
     ------
     ValueError
         Results of another schema or configuration are there, before anything is run; or jobs
-        failed, after all others were run.
+        failed, after all others were run; or a job's name cannot be published.
+    unwrap.storage.StorageError
+        The place holds something else, cannot be read, or a result there is damaged.
     KeyboardInterrupt
         Ctrl-C; what was finished is kept, and the message says how much.
     """
     folder = folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
+    if url is not None:
+        fetch_results(url, jobs, folder)
     # Renders and predicts, too, what several processes would else do at the same time.
     banks = banks_of(jobs)
     left = [
-        JobTask(job, folder, told)
+        JobTask(job, folder, told, url)
         for job in jobs
         if not stands(folder / job.name, told := job.depends_on(banks))
     ]
@@ -94,6 +111,8 @@ def run_jobs(
                 if error is not None:
                     failed.append(str(error))
                     say(f"{error}; the others go on")  # Now, and not hours later.
+                elif url is not None:
+                    fetch_result(url, task.job, folder)
                 order.release(task)
                 bar.update(1)
         except KeyboardInterrupt:
@@ -149,11 +168,23 @@ def bank_of(config: EnvConfig) -> str:
 
 
 def run_job(task: JobTask) -> None:
-    """Run one job; its bars and lines go to a file beside its result."""
-    began, (job, folder, depends_on) = time.process_time(), task
+    """Run one job; its bars and lines go to a file beside its result.
+
+    Where there is a place, in a folder that is deleted once all of it is published.
+    """
+    if task.url is not None:
+        with tempfile.TemporaryDirectory() as scratch:
+            here = task._replace(folder=Path(scratch), url=None)
+            if task.job.source is not None:
+                fetch_scheduler(task.url, task.job.source, here.folder)
+            with training_kept(task.url, task.job, task.depends_on, here.folder):
+                run_job(here)
+            publish_result(task.url, task.job, here.folder)
+        return
+    began, (job, folder, depends_on) = time.process_time(), task[:3]
     stem = visible(folder) / job.name
     stem.parent.mkdir(parents=True, exist_ok=True)
-    with output_to(stem.with_suffix(".log")):
+    with output_to(beside(stem, ".log")):
         config, arrays = job.config, {}
         if job.kind == REFERENCES:
             study = config.study

@@ -1,2 +1,3 @@
+from .checkpoint import CHECKPOINT as CHECKPOINT
 from .sb3_vector import Sb3VecEnv as Sb3VecEnv
-from .scheduler import train_scheduler as train_scheduler
+from .scheduler import VALIDATION as VALIDATION, train_scheduler as train_scheduler

@@ -157,6 +157,7 @@ room(
     "agents.study",
     *PLAYING,
     "unwrap.execution",
+    "unwrap.storage",
     "agents.evaluation",
     "agents.training",
 )
@@ -175,6 +176,7 @@ room(
     "agents.cli.command",
     "unwrap.support",
     "unwrap.execution",
+    "unwrap.storage",
     "unwrap.depth",
     "shotenv.config",
     "shotenv.decision",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Literal, Self
@@ -15,6 +16,7 @@ from unwrap.support import in_one_line
 LARGEST_JSON_BYTES = 64 * 2**20
 WORD = r"[A-Za-z0-9_-][A-Za-z0-9_.-]*"
 """A part of a path: it cannot be `..` nor hidden."""
+PATH = rf"{WORD}(/{WORD})*"
 
 
 class StoredFile(BaseModel):
@@ -22,7 +24,7 @@ class StoredFile(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    path: str = Field(pattern=rf"^{WORD}(/{WORD})*$", max_length=400)
+    path: str = Field(pattern=rf"^{PATH}$", max_length=400)
     sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
     bytes: int = Field(ge=0, le=2**40)
 
@@ -88,6 +90,24 @@ class Listing(BaseModel):
 
 def _digest_of(content: dict) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def require_storable(path: str) -> None:
+    """Refuse a path that no listing may have.
+
+    Raises
+    ------
+    ValueError
+        Names it and what is expected.
+
+    Examples
+    --------
+    >>> require_storable("default/my_rule-0")
+    """
+    if re.fullmatch(PATH, path) is None:
+        raise ValueError(
+            f"{path!r} cannot be published; expected letters, digits, '_', '-' and '.' in its names"
+        )
 
 
 def stored_files(folder: Path, names: Iterable[str], *, under: str = "") -> tuple[StoredFile, ...]:

@@ -11,8 +11,16 @@ from unwrap.storage.place import Place, StorageError
 CONTENTS = "contents.json"
 
 
-def publish_part(place: Place, label: str, part: str, folder: Path, *, under: str) -> Listing:
-    """Publish all files of `folder` as one part: first what is in them, then the part's listing.
+def publish_part(
+    place: Place,
+    label: str,
+    part: str,
+    folder: Path,
+    names: Sequence[str] | None = None,
+    *,
+    under: str = "",
+) -> Listing:
+    """Publish files of `folder` as one part: first what is in them, then the part's listing.
 
     What lies there already is not uploaded again.
 
@@ -22,6 +30,9 @@ def publish_part(place: Place, label: str, part: str, folder: Path, *, under: st
         What the part belongs to.
     part : str
         Name of the part.
+    names : sequence of str, optional
+        Paths of the files in `folder`, in the order in which they are to be fetched; by default
+        all that lie directly in it.
     under : str
         Folder of the files in what is published.
 
@@ -30,7 +41,8 @@ def publish_part(place: Place, label: str, part: str, folder: Path, *, under: st
     StorageError
         The place cannot be written.
     """
-    names = sorted(path.name for path in folder.iterdir())
+    if names is None:
+        names = sorted(path.name for path in folder.iterdir())
     listing = Listing(label=label, files=stored_files(folder, names, under=under))
     for name, file in zip(names, listing.files, strict=True):
         _upload(place, file, folder / name)
@@ -43,7 +55,7 @@ def standing_parts(place: Place, label: str) -> dict[str, Listing]:
 
     A damaged listing, or an object that is missing or has another length, is none.
     """
-    folder = _part_name(label, "").removesuffix("/.json")
+    folder = f"parts/{label}"
     names = [
         name
         for name, size in place.sizes(folder).items()
@@ -58,8 +70,19 @@ def standing_parts(place: Place, label: str) -> dict[str, Listing]:
             continue
         whole = all(lengths.get(file.object_name) == file.bytes for file in listing.files)
         if whole and listing.label == label:
-            parts[Path(name).stem] = listing
+            parts[name.removeprefix(f"{folder}/").removesuffix(".json")] = listing
     return parts
+
+
+def find_part(place: Place, label: str, part: str) -> Listing | None:
+    """Listing of one part, or None where it is not whole, see `standing_parts`."""
+    content = place.read(_part_name(label, part), most_bytes=LARGEST_JSON_BYTES)
+    try:
+        listing = Listing.decoded(content or b"")
+    except ValueError:
+        return None
+    whole = all(place.size(file.object_name) == file.bytes for file in listing.files)
+    return listing if whole and listing.label == label else None
 
 
 def publish_contents(

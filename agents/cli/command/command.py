@@ -88,6 +88,24 @@ def add_out(parser: ArgumentParser, default: str, what: str) -> None:
     parser.add_argument("--out", type=Path, default=Path(default), metavar="DIR", help=what)
 
 
+def add_out_or_url(parser: ArgumentParser, default: str, what: str) -> None:
+    """`--out DIR`, or the URL of a place: a path, or a str."""
+    parser.add_argument(
+        "--out",
+        type=_path_or_url,
+        default=Path(default),
+        metavar="DIR",
+        help=f"{what}; or the URL of a place, such as s3://bucket/study",
+    )
+
+
+def _path_or_url(text: str) -> Path | str:
+    from unwrap.storage import is_url
+
+    # A path would make one slash of the two.
+    return text if is_url(text) else Path(text)
+
+
 def add_sensor_and_merge(parser: ArgumentParser) -> None:
     """`--sensor` and `--merge`."""
     from unwrap.depth import Merge

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import yaml
+from short_studies import plan_of
 
 from agents.cli.entry import main
 from agents.config.study_plan import StudyPlan
@@ -17,49 +18,10 @@ from agents.study import job_runs
 from agents.study.job_results import JobResult, read_result, stands, write_result
 from agents.study.jobs import jobs_of
 from agents.study.leaderboard import make_leaderboard
-from shotenv.config.env import EnvConfig
 from shotenv.config.reader import ConfigError, configs_dir, read_config
-
-FAST = {
-    "algorithm": "regression",
-    "power_price": [0.01, 0.2],
-    "hidden": [4],
-    "regression": {
-        **{"rounds": 1, "drives": 2, "validation_drives": 2, "horizon": 1},
-        **{"members": 1, "passes": 1},
-    },
-}
-
-
-@pytest.fixture
-def files(tmp_path, tiny_kwargs):
-    """A preset and two learners, as YAML files."""
-    shipped = read_config(EnvConfig, configs_dir() / "env" / "default.yaml")
-    env = shipped.model_dump(mode="json") | tiny_kwargs | {"frames_per_drive": 8}
-    for name, content in {"short": env, "fast": FAST, "linear": {**FAST, "hidden": []}}.items():
-        (tmp_path / f"{name}.yaml").write_text(yaml.safe_dump(content))
-    return tmp_path
-
 
 ELSEWHERE = {"source": "short", "policies": ["fixed"], "tables": {"hot": {}}}
 """A transfer that is possible."""
-
-
-def plan_of(files, **changes):
-    fields = {
-        "policies": [str(files / "fast.yaml"), str(files / "linear.yaml"), "random", "fixed"],
-        "presets": [str(files / "short.yaml")],
-        "seeds": [0, 1],
-        "ablations": {
-            "no_heat": {
-                "policy": str(files / "fast.yaml"),
-                "unseen": ["temperature", "heat_margin"],
-                "presets": [str(files / "short.yaml")],
-            }
-        },
-        "study": {"drives": 2, "tuning_drives": 2, "prices": [0.02, 0.1], "bootstrap_draws": 100},
-    }
-    return StudyPlan.model_validate(fields | changes)
 
 
 def test_jobs_are_policies_x_presets_x_seeds(files):
