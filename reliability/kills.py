@@ -22,6 +22,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from reliability.processes import SHOTENV, digests, environment, orphans_after, started
@@ -190,30 +191,33 @@ def killed(run: Run, place: Path, variables: dict[str, str], seed: int) -> Tally
     return tally
 
 
+def of_run(run: Run, own: Path, variables: dict[str, str], seed: int) -> Row:
+    begun = time.perf_counter()
+    own.mkdir()
+    tally = killed(run, own, variables, seed)
+    shutil.rmtree(own)
+    faults = {
+        "files that differ": len(tally.different),
+        "ended with an error": len(tally.failed),
+        "processes left": tally.orphans,
+    }
+    told = {"which": sorted(set(tally.different))[:10]} if tally.different else {}
+    return Row(
+        8,
+        f"{run.name}, killed {tally.kills} times",
+        {"runs that came to their end": tally.ends, **faults, **told},
+        not any(faults.values()),
+        time.perf_counter() - begun,
+    )
+
+
 def measure(progress: Progress) -> list[Row]:
-    rows = []
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         variables = environment(place / "cache", OMP_NUM_THREADS="1")
-        for number, run in enumerate(runs(place, progress)):
-            begun = time.perf_counter()
-            own = place / f"run{number}"
-            own.mkdir()
-            tally = killed(run, own, variables, number)
-            progress(f"{run.name}: {json.dumps(vars(tally))}")
-            faults = {
-                "files that differ": len(tally.different),
-                "ended with an error": len(tally.failed),
-                "processes left": tally.orphans,
-            }
-            rows.append(
-                Row(
-                    8,
-                    f"{run.name}, killed {tally.kills} times",
-                    {"runs that came to their end": tally.ends, **faults},
-                    not any(faults.values()),
-                    time.perf_counter() - begun,
-                )
+        return [
+            progress.row(
+                8, run.name, partial(of_run, run, place / f"run{number}", variables, number)
             )
-            shutil.rmtree(own)
-    return rows
+            for number, run in enumerate(runs(place, progress))
+        ]

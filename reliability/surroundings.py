@@ -15,6 +15,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import permutations
 from pathlib import Path
 
@@ -196,8 +197,23 @@ def of_processes(place: Path, orders: int) -> list[Case]:
     return cases
 
 
+def of_cases(name: str, cases: list[Case], cache: Path, progress: Progress) -> Row:
+    begun, faults = time.perf_counter(), []
+    for case in cases:
+        found = faults_of(case, cache)
+        progress(f"{case.name}: {found or 'as promised'}")
+        if found:
+            faults.append(f"{case.name} {found}")
+    return Row(
+        11,
+        f"{name}: {len(cases)} cases",
+        {"as promised": len(cases) - len(faults), "not": faults or "none"},
+        not faults,
+        time.perf_counter() - begun,
+    )
+
+
 def measure(progress: Progress) -> list[Row]:
-    rows = []
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         kinds = {
@@ -207,20 +223,7 @@ def measure(progress: Progress) -> list[Row]:
                 place, progress.size(24, 2)
             ),
         }
-        for name, cases in kinds.items():
-            begun, faults = time.perf_counter(), []
-            for case in cases:
-                if found := faults_of(case, place / "cache"):
-                    faults.append(f"{case.name} {found}")
-                    progress(faults[-1])
-            progress(f"{name}: {len(cases) - len(faults)} of {len(cases)}")
-            rows.append(
-                Row(
-                    11,
-                    f"{name}: {len(cases)} cases",
-                    {"as promised": len(cases) - len(faults), "not": faults or "none"},
-                    not faults,
-                    time.perf_counter() - begun,
-                )
-            )
-    return rows
+        return [
+            progress.row(11, name, partial(of_cases, name, cases, place / "cache", progress))
+            for name, cases in kinds.items()
+        ]
