@@ -4,14 +4,12 @@
 it is left alone (the first is imports). It is started again until it ends, and killed again until
 each kind of run has had its kills; then every file is compared, hidden ones as well, in the folder
 of the run and beside it. What may differ are logs: `*.log`, TensorBoard's, what Lightning writes
-beside the weights for itself, and how many seconds a job took. Of safetensors files all tensors and
-words are compared, but not the order of the words, which the library leaves to chance.
+beside the weights for itself, and how many seconds a job took.
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import random
 import re
@@ -131,21 +129,11 @@ def left_by(parent: Path, run: Run) -> dict[str, str]:
     skipped = re.compile(run.may_differ)
     found = digests(parent, lambda name: skipped.search(name) is not None)
     for name in found:
-        if name.endswith(".safetensors"):
-            found[name] = tensors_digest(parent / name)
         if name.endswith((".json", ".yaml")):
             text = (parent / name).read_text(encoding="utf-8").replace(str(parent), "")
             text = re.sub(r'"(seconds|training_minutes)": [\d.]+', "", text)
             found[name] = hashlib.sha256(text.encode()).hexdigest()
     return found
-
-
-def tensors_digest(path: Path) -> str:
-    """SHA-256 of header, its keys sorted, and tensors of a safetensors file."""
-    content = path.read_bytes()
-    end = 8 + int.from_bytes(content[:8], "little")
-    header = json.dumps(json.loads(content[8:end]), sort_keys=True)
-    return hashlib.sha256(header.encode() + content[end:]).hexdigest()
 
 
 def whole(run: Run, parent: Path, variables: dict[str, str]) -> tuple[dict[str, str], float]:

@@ -81,7 +81,8 @@ class Progress:
         if self.parts is not None:
             self.parts.parent.mkdir(exist_ok=True)
             with self.parts.open("a", encoding="utf-8") as file:
-                file.write(json.dumps([name, value]) + "\n")
+                # On a line of its own, whatever a killed process has left of its last.
+                file.write("\n" + json.dumps([name, value]))
         return value
 
     def row(self, promise: int, name: str, make: Callable[[], Row]) -> Row:
