@@ -80,7 +80,7 @@ def test_an_interrupted_measurement_goes_on(monkeypatch, tmp_path):
     rows.keep("rows", found, 1.0)
     # A process that was killed as it wrote.
     with rows.parts_of("rows").open("a") as file:
-        file.write('["second", {"promi')
+        file.write('\n["second", {"promi')
     assert measured(broken=False) == [ROW, ROW]
     assert asked == ["first", "second", "second"]
     rows.keep("rows", [ROW, ROW], 1.0)
