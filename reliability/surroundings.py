@@ -58,6 +58,7 @@ if __name__ == "__main__":
     envs.close()
     print("played")
 """
+LIBRARIES = Path("/usr/lib")
 IMPORTS = ("torch", "mitsuba", "numba", "stable_baselines3", "shotenv")
 ODD = ("with spaces", "Umläute-日本", "line\nbreak", "-dash", "x" * 200, "quo'te\"s", "a[b]*?")
 
@@ -227,10 +228,15 @@ def of_processes(place: Path, orders: int) -> list[Case]:
     no_library = place / "libLLVM-15.so"
     no_library.write_bytes(b"\x7fELF of nothing")
     cases.append(Case("one core: render", [*render, place / "one"], before=one_core))
-    for name, path in (("missing", place / "none.so"), ("a file that is none", no_library)):
-        llvm = {"DRJIT_LIBLLVM_PATH": str(path)}
-        out = place / f"llvm{len(cases)}"
-        told = "cannot be loaded as an LLVM library"
+    unusable = "cannot be loaded as an LLVM library"
+    libraries = [
+        ("missing", place / "none.so", unusable),
+        ("a file that is none", no_library, unusable),
+        # Where this machine has one: Debian's `libllvm15`.
+        *(("15", path, "is LLVM 15") for path in sorted(LIBRARIES.glob("*/libLLVM-15.so.1"))[:1]),
+    ]
+    for name, path, told in libraries:
+        out, llvm = place / f"llvm{len(cases)}", {"DRJIT_LIBLLVM_PATH": str(path)}
         cases.append(Case(f"LLVM: {name}", [*render, out], False, told, llvm))
     return cases
 
