@@ -27,6 +27,8 @@ from reliability.processes import SHOTENV, digests, environment, orphans_after, 
 from reliability.rows import Progress, Row
 from reliability.small import small_recordings, study_files, tiny_problem, write_small_bank_config
 
+HANGS = 20
+"""As many times longer than it takes, and a run that nobody kills any more has failed."""
 ENDS_S = 10.0
 """Within which workers have ended after their parent."""
 LEARNERS = {
@@ -158,15 +160,17 @@ def killed(run: Run, place: Path, variables: dict[str, str], seed: int) -> Tally
         log, status = parent.with_suffix(".txt"), None
         while status is None:
             process = started(run.words(parent / "out"), variables, log)
+            last = tally.kills >= run.kills
+            limit_s = HANGS * seconds if last else moment.uniform(0.2, 1.0) * seconds
             try:
-                if tally.kills >= run.kills:
-                    status = process.wait()
-                else:
-                    status = process.wait(moment.uniform(0.2, 1.0) * seconds)
+                status = process.wait(limit_s)
             except subprocess.TimeoutExpired:
                 os.kill(process.pid, signal.SIGKILL)
-                process.wait()
-                tally.kills += 1
+                killed_by = process.wait()
+                if last:  # It hangs.
+                    status = killed_by
+                else:
+                    tally.kills += 1
             tally.orphans += len(orphans_after(process.pid, ENDS_S))
         tally.ends += 1
         if status != 0:
