@@ -138,7 +138,8 @@ def of_command(command: Command, how: signal.Signals, place: Path) -> Row:
         {
             "named after, s": round(named_s, 1) if named_s < 60 else "never",
             "processes left": len(orphans),
-            "said": re.sub(r"\S*/", "", named() or "nothing")[:160],
+            # Without the progress bar before it, and without folders.
+            "said": re.sub(r"^.*(?=shotenv: )|\S*/", "", named() or "nothing")[:160],
         },
         named_s <= LIMIT_S and not orphans and "Traceback" not in log.read_text(),
         time.perf_counter() - begun,
@@ -166,7 +167,9 @@ def of_vector(name: str, makes: list[Callable[[], gymnasium.Env]], how: int | No
         # A stopped one does not see that it is asked to end: `close(terminate=True)` would wait.
         process.kill()
         process.join(1.0)
-    envs.close_extras(terminate=True)
+    # Nor does `close` cope with pipes whose ends are gone.
+    for pipe in envs.parent_pipes:
+        pipe.close()
     envs.closed = True
     left = [pid for pid in pids if Path(f"/proc/{pid}").exists()]
     return Row(
