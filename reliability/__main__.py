@@ -10,7 +10,7 @@ import traceback
 
 import reliability
 from reliability.page import MEASUREMENTS, PAGE, page
-from reliability.rows import Progress, Row, file_of, keep
+from reliability.rows import Progress, Row, file_of, keep, parts_of
 
 
 def printed(row: Row) -> str:
@@ -39,8 +39,12 @@ def measured(name: str, progress: Progress) -> bool:
 
 
 def missing(*, whole: bool) -> list[str]:
-    """Measurements without a file; for a trial, which keeps none, all of them."""
-    return [name for name in MEASUREMENTS if not (whole and file_of(name).is_file())]
+    """Measurements that are not done; for a trial, which keeps nothing, all of them."""
+    return [
+        name
+        for name in MEASUREMENTS
+        if not (whole and file_of(name).is_file() and not parts_of(name).is_file())
+    ]
 
 
 def main() -> int:
@@ -53,7 +57,8 @@ def main() -> int:
         "names",
         nargs="*",
         metavar="NAME",
-        help=f"some of {', '.join(MEASUREMENTS)}, anew; by default those that have no file yet",
+        help=f"some of {', '.join(MEASUREMENTS)}, anew, or from where it was interrupted; "
+        "by default those that are not done",
     )
     parser.add_argument(
         "--quick", action="store_true", help="a trial of small size; nothing is kept"
@@ -65,7 +70,10 @@ def main() -> int:
         if name not in MEASUREMENTS:
             parser.error(f"NAME is {name!r}; expected one of {', '.join(MEASUREMENTS)}")
     names = [] if arguments.page else arguments.names or missing(whole=not arguments.quick)
-    held = [measured(name, Progress(arguments.quick)) for name in names]
+    held = []
+    for name in names:
+        parts = None if arguments.quick else parts_of(name)
+        held.append(measured(name, Progress(arguments.quick, parts=parts)))
     if not arguments.quick:
         PAGE.write_text(page(), encoding="utf-8")
         print(f"Page: {PAGE}")

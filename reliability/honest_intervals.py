@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -48,23 +49,22 @@ def measure(progress: Progress) -> list[Row]:
         "bias-corrected and accelerated": by_acceleration,
         "percentiles": by_percentiles,
     }
-    rows = []
-    for name, interval in kinds.items():
+
+    def of(name: str) -> Row:
         begun, random, covered = time.perf_counter(), np.random.default_rng(0), 0
         for number in range(repetitions):
             reference, cost = drawn(random)
-            found = interval(cost, reference, study)
+            found = kinds[name](cost, reference, study)
             covered += found.low <= TRUTH <= found.high
             if (number + 1) % 100 == 0:
                 progress(f"{name}: {covered} of {number + 1} covered")
         share = covered / repetitions
-        rows.append(
-            Row(
-                14,
-                f"{repetitions} repetitions, {CLIPS} clips, a ratio of sums; bootstrap: {name}",
-                {"covered, %": 100 * share},
-                abs(share - 0.95) <= ALLOWED,
-                time.perf_counter() - begun,
-            )
+        return Row(
+            14,
+            f"{repetitions} repetitions, {CLIPS} clips, a ratio of sums; bootstrap: {name}",
+            {"covered, %": 100 * share},
+            abs(share - 0.95) <= ALLOWED,
+            time.perf_counter() - begun,
         )
-    return rows
+
+    return [progress.row(14, name, partial(of, name)) for name in kinds]

@@ -17,7 +17,7 @@ import shutil
 import tempfile
 import time
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -61,7 +61,7 @@ def measure(progress: Progress) -> list[Row]:
     begun = time.perf_counter()
     tallies = []
     for kind in KINDS:
-        tallies.append(tallied(kind, round(kind.share * count)))
+        tallies.append(_kept(kind, round(kind.share * count), progress))
         progress(f"{kind.name}: {len(tallies[-1].faults)} faults, {tallies[-1].refused} refused")
         for fault in tallies[-1].faults[:5]:
             progress(f"  {fault[:300]}")
@@ -87,6 +87,10 @@ def measure(progress: Progress) -> list[Row]:
         )
     )
     return rows
+
+
+def _kept(kind: Kind, count: int, progress: Progress) -> Tally:
+    return Tally(**progress.part(kind.name, lambda: asdict(tallied(kind, count))))
 
 
 def tallied(kind: Kind, count: int, seed: int = SEED) -> Tally:

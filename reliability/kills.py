@@ -4,14 +4,12 @@
 it is left alone (the first is imports). It is started again until it ends, and killed again until
 each kind of run has had its kills; then every file is compared, hidden ones as well, in the folder
 of the run and beside it. What may differ are logs: `*.log`, TensorBoard's, what Lightning writes
-beside the weights for itself, and how many seconds a job took. Of safetensors files all tensors and
-words are compared, but not the order of the words, which the library leaves to chance.
+beside the weights for itself, and how many seconds a job took.
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import random
 import re
@@ -22,12 +20,15 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from reliability.processes import SHOTENV, digests, environment, orphans_after, started
 from reliability.rows import Progress, Row
 from reliability.small import small_recordings, study_files, tiny_problem, write_small_bank_config
 
+HANGS = 20
+"""As many times longer than it takes, and a run that nobody kills any more has failed."""
 ENDS_S = 10.0
 """Within which workers have ended after their parent."""
 LEARNERS = {
@@ -130,21 +131,11 @@ def left_by(parent: Path, run: Run) -> dict[str, str]:
     skipped = re.compile(run.may_differ)
     found = digests(parent, lambda name: skipped.search(name) is not None)
     for name in found:
-        if name.endswith(".safetensors"):
-            found[name] = tensors_digest(parent / name)
         if name.endswith((".json", ".yaml")):
             text = (parent / name).read_text(encoding="utf-8").replace(str(parent), "")
             text = re.sub(r'"(seconds|training_minutes)": [\d.]+', "", text)
             found[name] = hashlib.sha256(text.encode()).hexdigest()
     return found
-
-
-def tensors_digest(path: Path) -> str:
-    """SHA-256 of header, its keys sorted, and tensors of a safetensors file."""
-    content = path.read_bytes()
-    end = 8 + int.from_bytes(content[:8], "little")
-    header = json.dumps(json.loads(content[8:end]), sort_keys=True)
-    return hashlib.sha256(header.encode() + content[end:]).hexdigest()
 
 
 def whole(run: Run, parent: Path, variables: dict[str, str]) -> tuple[dict[str, str], float]:
@@ -169,15 +160,17 @@ def killed(run: Run, place: Path, variables: dict[str, str], seed: int) -> Tally
         log, status = parent.with_suffix(".txt"), None
         while status is None:
             process = started(run.words(parent / "out"), variables, log)
+            last = tally.kills >= run.kills
+            limit_s = HANGS * seconds if last else moment.uniform(0.2, 1.0) * seconds
             try:
-                if tally.kills >= run.kills:
-                    status = process.wait()
-                else:
-                    status = process.wait(moment.uniform(0.2, 1.0) * seconds)
+                status = process.wait(limit_s)
             except subprocess.TimeoutExpired:
                 os.kill(process.pid, signal.SIGKILL)
-                process.wait()
-                tally.kills += 1
+                killed_by = process.wait()
+                if last:  # It hangs.
+                    status = killed_by
+                else:
+                    tally.kills += 1
             tally.orphans += len(orphans_after(process.pid, ENDS_S))
         tally.ends += 1
         if status != 0:
@@ -190,30 +183,33 @@ def killed(run: Run, place: Path, variables: dict[str, str], seed: int) -> Tally
     return tally
 
 
+def of_run(run: Run, own: Path, variables: dict[str, str], seed: int) -> Row:
+    begun = time.perf_counter()
+    own.mkdir()
+    tally = killed(run, own, variables, seed)
+    shutil.rmtree(own)
+    faults = {
+        "files that differ": len(tally.different),
+        "ended with an error": len(tally.failed),
+        "processes left": tally.orphans,
+    }
+    told = {"which": sorted(set(tally.different))[:10]} if tally.different else {}
+    return Row(
+        8,
+        f"{run.name}, killed {tally.kills} times",
+        {"runs that came to their end": tally.ends, **faults, **told},
+        not any(faults.values()),
+        time.perf_counter() - begun,
+    )
+
+
 def measure(progress: Progress) -> list[Row]:
-    rows = []
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         variables = environment(place / "cache", OMP_NUM_THREADS="1")
-        for number, run in enumerate(runs(place, progress)):
-            begun = time.perf_counter()
-            own = place / f"run{number}"
-            own.mkdir()
-            tally = killed(run, own, variables, number)
-            progress(f"{run.name}: {json.dumps(vars(tally))}")
-            faults = {
-                "files that differ": len(tally.different),
-                "ended with an error": len(tally.failed),
-                "processes left": tally.orphans,
-            }
-            rows.append(
-                Row(
-                    8,
-                    f"{run.name}, killed {tally.kills} times",
-                    {"runs that came to their end": tally.ends, **faults},
-                    not any(faults.values()),
-                    time.perf_counter() - begun,
-                )
+        return [
+            progress.row(
+                8, run.name, partial(of_run, run, place / f"run{number}", variables, number)
             )
-            shutil.rmtree(own)
-    return rows
+            for number, run in enumerate(runs(place, progress))
+        ]

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import gymnasium
@@ -127,12 +128,12 @@ def of_frames(frames: int, place: Path, progress: Progress) -> Row:
 
 
 def measure(progress: Progress) -> list[Row]:
-    rows = []
+    steps, frames = progress.size(STEPS, 20_000), progress.size(FRAMES, 200)
     with tempfile.TemporaryDirectory() as folder:
-        for kind in ("single", "vector"):
-            steps = progress.size(STEPS, 20_000)
-            rows.append(of_steps(kind, steps, Path(folder) / "cache"))
-            progress(str(rows[-1]))
-        rows.append(of_frames(progress.size(FRAMES, 200), Path(folder), progress))
-        progress(str(rows[-1]))
-    return rows
+        place = Path(folder)
+        kinds: dict[str, Callable[[], Row]] = {
+            "steps of the single environment": lambda: of_steps("single", steps, place / "cache"),
+            "steps of a vector": lambda: of_steps("vector", steps, place / "cache"),
+            "rendered frames": lambda: of_frames(frames, place, progress),
+        }
+        return [progress.row(9, name, make) for name, make in kinds.items()]

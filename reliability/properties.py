@@ -10,6 +10,7 @@ import re
 import subprocess
 import sys
 import time
+from functools import partial
 
 from reliability.rows import ROOT, Progress, Row
 
@@ -17,10 +18,8 @@ from reliability.rows import ROOT, Progress, Row
 def measure(progress: Progress) -> list[Row]:
     """A row for each file of properties."""
     profile, examples = ("everyday", 60) if progress.quick else ("long", 10_000)
-    rows = []
-    for path in sorted((ROOT / "tests").rglob("test_*_properties.py")):
-        name = str(path.relative_to(ROOT))
-        progress(name)
+
+    def of(name: str) -> Row:
         begun = time.perf_counter()
         command = [sys.executable, "-m", "pytest", "-n0", "-q", "--timeout=0"]
         command += [f"--hypothesis-profile={profile}", name]
@@ -31,8 +30,11 @@ def measure(progress: Progress) -> list[Row]:
             progress(told.stdout)
         seconds = time.perf_counter() - begun
         done = f"up to {examples} drawn examples of each property in `{name}`"
-        rows.append(Row(5, done, found, told.returncode == 0, seconds))
-    return rows
+        return Row(5, done, found, told.returncode == 0, seconds)
+
+    paths = sorted((ROOT / "tests").rglob("test_*_properties.py"))
+    names = [str(path.relative_to(ROOT)) for path in paths]
+    return [progress.row(5, name, partial(of, name)) for name in names]
 
 
 def last_line(told: subprocess.CompletedProcess[str]) -> str:

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 
 import gymnasium
@@ -80,6 +81,14 @@ def tell(folder: str, threads: str, steps: str) -> None:
     print(json.dumps(found))
 
 
+def told_by(words: list[str], variables: dict[str, str]) -> object:
+    """What a process prints, as JSON."""
+    done = subprocess.run(words, env=variables, capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(done.stderr)
+    return json.loads(done.stdout)
+
+
 def measure(progress: Progress) -> list[Row]:
     begun, steps, told = time.perf_counter(), progress.size(STEPS, 40), []
     settings = [(h, t) for h in PROCESSES["PYTHONHASHSEED"] for t in PROCESSES["threads"]]
@@ -91,10 +100,8 @@ def measure(progress: Progress) -> list[Row]:
             # Each predicts for itself: nothing is read that another has computed.
             variables = environment(place / f"cache{number}", PYTHONHASHSEED=str(hash_seed))
             words = [sys.executable, "-c", PROGRAM, folder, str(threads), str(steps)]
-            done = subprocess.run(words, env=variables, capture_output=True, text=True)
-            if done.returncode:
-                raise RuntimeError(done.stderr)
-            told.append(json.loads(done.stdout))
+            name = f"hash seed {hash_seed}, {threads} threads"
+            told.append(progress.part(name, partial(told_by, words, variables)))
             progress(f"process {number + 1} of {len(settings)}")
     between = sum(
         one[name][size] != told[0][name][size] for one in told for name in one for size in one[name]

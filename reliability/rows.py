@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import os
 import time
+import traceback
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -40,9 +42,13 @@ class Row:
     seconds: float
 
 
+UNMEASURED = "could not be measured"
+"""What is found where a part of a measurement raises."""
+
+
 @dataclass(frozen=True)
 class Progress:
-    """Tells how far a measurement is, and how much it is to do.
+    """Tells how far a measurement is, how much it is to do, and keeps the parts that are done.
 
     Parameters
     ----------
@@ -50,10 +56,13 @@ class Progress:
         A trial: each `size` is the second of its arguments. What it finds is not kept.
     say : callable, optional
         Where a line goes; by default it is printed at once.
+    parts : Path, optional
+        File of the parts that are done, with a line of JSON each; without one none is kept.
     """
 
     quick: bool = False
     say: Callable[[str], None] = lambda words: print(words, flush=True)
+    parts: Path | None = None
 
     def __call__(self, words: str) -> None:
         self.say(f"  {words}")
@@ -61,6 +70,41 @@ class Progress:
     def size(self, whole: int, trial: int) -> int:
         """How often or how long: as promised, or for a trial."""
         return trial if self.quick else whole
+
+    def part(self, name: str, make: Callable[[], Any]) -> Any:
+        """What `make` gives, as JSON has it; of an interrupted measurement, what it gave then."""
+        for kept_name, value in self._kept():
+            if kept_name == name:
+                self(f"{name}: done before")
+                return value
+        value = make()
+        if self.parts is not None:
+            self.parts.parent.mkdir(exist_ok=True)
+            with self.parts.open("a", encoding="utf-8") as file:
+                # On a line of its own, whatever a killed process has left of its last.
+                file.write("\n" + json.dumps([name, value]))
+        return value
+
+    def row(self, promise: int, name: str, make: Callable[[], Row]) -> Row:
+        """A row as a part; where `make` raises, a row that says so, and the others go on."""
+        begun = time.perf_counter()
+        try:
+            row = Row(**self.part(name, lambda: asdict(make())))
+        except Exception as error:
+            traceback.print_exc()
+            found = {UNMEASURED: f"{type(error).__name__}: {error}"[:300]}
+            row = Row(promise, name, found, False, time.perf_counter() - begun)
+        self(str(row))
+        return row
+
+    def _kept(self) -> list[tuple[str, Any]]:
+        if self.parts is None or not self.parts.is_file():
+            return []
+        found = []
+        for line in self.parts.read_text(encoding="utf-8").splitlines():
+            with suppress(ValueError):  # The last line of a process that was killed.
+                found.append(tuple(json.loads(line)))
+        return found
 
 
 def machine() -> dict[str, str | int]:
@@ -78,6 +122,11 @@ def file_of(name: str) -> Path:
     return KEPT / f"{name}.json"
 
 
+def parts_of(name: str) -> Path:
+    """Where the parts of a measurement are kept until all of them are done."""
+    return file_of(name).with_suffix(".parts")
+
+
 def keep(name: str, rows: list[Row], seconds: float) -> None:
     """Write the rows of a measurement, beside first: an interrupted one leaves the former."""
     told = {
@@ -91,6 +140,8 @@ def keep(name: str, rows: list[Row], seconds: float) -> None:
     beside = file_of(name).with_suffix(".part")
     beside.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
     beside.replace(file_of(name))
+    if not any(UNMEASURED in row.found for row in rows):
+        parts_of(name).unlink(missing_ok=True)
 
 
 def kept(name: str) -> dict[str, Any]:

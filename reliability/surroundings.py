@@ -1,28 +1,36 @@
 """Any surroundings work, or one sentence says what to do; nothing ends in a traceback.
 
-Each case is a command or a short program in a process of its own: a full disk (as far as files may
-grow, `RLIMIT_FSIZE`, and a small file system where this runs as root), a cache that cannot be
+Each case is a command or a short program in a process of its own: a full disk (a small file system
+where this runs as root, else a limit to the size of files, `RLIMIT_FSIZE`), a cache that cannot be
 written, odd paths, no home folder, orders of imports, ways to start processes, one core, no LLVM.
 """
 
 from __future__ import annotations
 
+import errno
 import os
+import re
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import permutations
 from pathlib import Path
+from typing import Any
 
 from reliability.processes import SHOTENV, environment
-from reliability.rows import Progress, Row
-from reliability.small import tiny_problem, write_small_bank_config
+from reliability.rows import ROOT, Progress, Row
+from reliability.small import small_recordings, study_files, tiny_problem, write_small_bank_config
 
 LIMIT_S = 300
+FULL = r"is the disk full\?|but the disk has .* free"
+"""What NumPy's words are made to end with, and what is said before a bank is begun."""
 PLAY = """
 import gymnasium, shotenv
 env = gymnasium.make("shotenv/ShotSchedule-v0", frames_per_drive=8)
@@ -50,6 +58,7 @@ if __name__ == "__main__":
     envs.close()
     print("played")
 """
+LIBRARIES = Path("/usr/lib")
 IMPORTS = ("torch", "mitsuba", "numba", "stable_baselines3", "shotenv")
 ODD = ("with spaces", "Umläute-日本", "line\nbreak", "-dash", "x" * 200, "quo'te\"s", "a[b]*?")
 
@@ -63,7 +72,7 @@ class Case:
     works : bool
         Whether it is to do its work, or to say in one sentence what is the matter.
     says : str
-        What is in that sentence.
+        Pattern of what is in that sentence.
     """
 
     name: str
@@ -94,15 +103,35 @@ def faults_of(case: Case, cache: Path) -> str:
         return f"ends in a traceback: {told.splitlines()[-1][:200]}"
     if case.works:
         return "" if done.returncode == 0 else f"status {done.returncode}: {told[-300:]}"
-    if done.returncode != 1 or case.says not in told:
+    if done.returncode != 1 or not re.search(case.says, told):
         return f"status {done.returncode}, without {case.says!r}: {told[-300:]}"
     return ""
 
 
-def small_files() -> None:
-    """As if the disk were full: writing beyond 20 kB fails, with a signal that is ignored."""
-    import signal
+@contextmanager
+def full_disk(place: Path) -> Iterator[dict[str, Any]]:
+    """What of a `Case` makes its disk full, which is at `place`.
 
+    A file system of 64 kB where this may be mounted, as root may; else no file grows beyond 20 kB,
+    which is another error of the same kind.
+    """
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(place)]
+    try:
+        mounted = subprocess.run(mount, capture_output=True).returncode == 0
+    except OSError:
+        mounted = False
+    if not mounted:
+        yield {"says": f"{os.strerror(errno.EFBIG)}|{FULL}", "before": small_files}
+        return
+    try:
+        yield {"says": f"{os.strerror(errno.ENOSPC)}|{FULL}"}
+    finally:
+        subprocess.run(["umount", "--lazy", str(place)], check=True)
+
+
+def small_files() -> None:
+    """Writing beyond 20 kB fails, with a signal that is ignored."""
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 
@@ -111,30 +140,41 @@ def one_core() -> None:
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
 
 
-def of_disks(place: Path) -> list[Case]:
-    """A full disk for each command that writes, and a cache that cannot be written."""
+def of_full_disks(place: Path, full: dict[str, Any]) -> list[Case]:
+    """A full disk, at `place / "full"`, for each command that writes."""
     small, tiny = write_small_bank_config(place), tiny_problem(place)
     env = [f"--env.{name}={value}" for name, value in {**tiny, "frames_per_drive": 16}.items()]
     few = ["--agent.regression.rounds=1", "--agent.regression.drives=2", "--study.tuning_drives=2"]
-    train = [*SHOTENV, "train", *env, "--agent", "configs/agent/regression.yaml", *few]
+    told = [f"--bank={tiny['bank']}", "--width=4", "--epochs=1", "--batch_size=2"]
+    recordings = small_recordings(place, 2)
+    commands: dict[str, list[object]] = {
+        "render": ["--config", small],
+        "train": [*env, "--agent", ROOT / "configs/agent/regression.yaml", *few],
+        "unwrap train": told,
+        "study": [study_files(place)],
+        "bank import": [
+            *(recordings, "--camera", "mlx75027", "--sensor", recordings / "sensor.yaml")
+        ],
+        "record": ["--camera", "mlx75027", *(f"--{name}={value}" for name, value in tiny.items())],
+    }
+    return [
+        Case(
+            f"full disk: {name}",
+            [*SHOTENV, *name.split(), *words, "--out", place / "full" / str(number)],
+            works=False,
+            variables={"SHOTENV_CACHE": str(place / "full" / f"cache{number}")},
+            **full,
+        )
+        for number, (name, words) in enumerate(commands.items())
+    ]
+
+
+def of_folders(place: Path) -> list[Case]:
+    """A cache that cannot be written, and no home folder."""
     blocked = place / "blocked"
     blocked.write_text("a file where a folder is to be")
-    render, network = [*SHOTENV, "render", "--config", small], [*SHOTENV, "unwrap", "train"]
-    told = [f"--bank={tiny['bank']}", "--width=4", "--epochs=1", "--batch_size=2"]
-    full = {"works": False, "says": "File too large", "before": small_files}
+    render = [*SHOTENV, "render", "--config", write_small_bank_config(place)]
     return [
-        # NumPy says how much it could not write, and not why.
-        Case(
-            "full disk: render",
-            [*render, "--out", place / "f1"],
-            **{**full, "says": "requested and"},
-        ),  # type: ignore[arg-type]
-        Case(
-            "full disk: train",
-            [*train, "--out", place / "f2"],
-            **{**full, "says": "distance_m.npy: "},
-        ),  # type: ignore[arg-type]
-        Case("full disk: unwrap train", [*network, *told, "--out", place / "f3"], **full),  # type: ignore[arg-type]
         Case(
             "cache that cannot be written: play",
             [sys.executable, "-c", PLAY],
@@ -188,39 +228,48 @@ def of_processes(place: Path, orders: int) -> list[Case]:
     no_library = place / "libLLVM-15.so"
     no_library.write_bytes(b"\x7fELF of nothing")
     cases.append(Case("one core: render", [*render, place / "one"], before=one_core))
-    for name, path in (("missing", place / "none.so"), ("a file that is none", no_library)):
-        llvm = {"DRJIT_LIBLLVM_PATH": str(path)}
-        out = place / f"llvm{len(cases)}"
-        told = "cannot be loaded as an LLVM library"
+    unusable = "cannot be loaded as an LLVM library"
+    libraries = [
+        ("missing", place / "none.so", unusable),
+        ("a file that is none", no_library, unusable),
+        # Where this machine has one: Debian's `libllvm15`.
+        *(("15", path, "is LLVM 15") for path in sorted(LIBRARIES.glob("*/libLLVM-15.so.1"))[:1]),
+    ]
+    for name, path, told in libraries:
+        out, llvm = place / f"llvm{len(cases)}", {"DRJIT_LIBLLVM_PATH": str(path)}
         cases.append(Case(f"LLVM: {name}", [*render, out], False, told, llvm))
     return cases
 
 
+def of_cases(name: str, cases: list[Case], cache: Path, progress: Progress) -> Row:
+    begun, faults = time.perf_counter(), []
+    for case in cases:
+        found = faults_of(case, cache)
+        progress(f"{case.name}: {found or 'as promised'}")
+        if found:
+            faults.append(f"{case.name} {found}")
+    return Row(
+        11,
+        f"{name}: {len(cases)} cases",
+        {"as promised": len(cases) - len(faults), "not": faults or "none"},
+        not faults,
+        time.perf_counter() - begun,
+    )
+
+
 def measure(progress: Progress) -> list[Row]:
-    rows = []
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, full_disk(Path(folder) / "full") as full:
         place = Path(folder)
+        how = "files of at most 20 kB" if "before" in full else "a file system of 64 kB"
         kinds = {
-            "full disk, unwritable cache, no home folder": of_disks(place),
+            f"full disk, {how}": of_full_disks(place, full),
+            "unwritable cache, no home folder": of_folders(place),
             "odd paths": of_paths(place),
             "imports, spawn and forkserver, one core, LLVM": of_processes(
                 place, progress.size(24, 2)
             ),
         }
-        for name, cases in kinds.items():
-            begun, faults = time.perf_counter(), []
-            for case in cases:
-                if found := faults_of(case, place / "cache"):
-                    faults.append(f"{case.name} {found}")
-                    progress(faults[-1])
-            progress(f"{name}: {len(cases) - len(faults)} of {len(cases)}")
-            rows.append(
-                Row(
-                    11,
-                    f"{name}: {len(cases)} cases",
-                    {"as promised": len(cases) - len(faults), "not": faults or "none"},
-                    not faults,
-                    time.perf_counter() - begun,
-                )
-            )
-    return rows
+        return [
+            progress.row(11, name, partial(of_cases, name, cases, place / "cache", progress))
+            for name, cases in kinds.items()
+        ]

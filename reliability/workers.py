@@ -1,13 +1,13 @@
 """A dead, stopped or raising worker is named within 10 s, and nothing is left running.
 
-Workers of rendering and of a study are killed or stopped from outside while the command is at work;
-one that raises is a user's environment in Gymnasium's AsyncVectorEnv, and a source of frames that a
-network is trained on. AsyncVectorEnv itself waits for ever where it is not given a `timeout`.
+Workers of rendering, of a study and of the training of a network on two devices are killed or
+stopped from outside while the command is at work; one that raises is a user's environment in
+Gymnasium's AsyncVectorEnv, and a source of frames that a network is trained on. AsyncVectorEnv
+itself waits for ever where it is not given a `timeout`.
 """
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import re
 import signal
@@ -15,6 +15,8 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import gymnasium
@@ -22,11 +24,11 @@ import gymnasium
 import shotenv  # noqa: F401 - registers the environments
 from reliability.processes import SHOTENV, environment, group, orphans_after, started, wait_for
 from reliability.rows import Progress, Row
-from reliability.small import study_files, write_small_bank_config
+from reliability.small import study_files, tiny_problem, write_small_bank_config
 from unwrap.training.data import AcquiredAhead, in_order
 
 LIMIT_S = 10.0
-STARTS_S = 120.0
+STARTS_S = 300.0
 """Within which a command has workers that are at work."""
 TIMEOUT_S = 5.0
 """What AsyncVectorEnv is told to wait for a step."""
@@ -80,37 +82,66 @@ def workers_of(leader: int) -> list[int]:
     return found
 
 
-def of_command(
-    name: str, words: list[object], how: signal.Signals, place: Path, variables: dict[str, str]
-) -> Row:
+@dataclass(frozen=True)
+class Command:
+    """What has workers.
+
+    Attributes
+    ----------
+    name : str
+    words : list
+        Without the folder it writes.
+    at_work : callable
+        Whether its workers are at a task and not only at their imports, from its folder.
+    naming : str
+        Pattern of what it says of a lost worker, besides its process number; by default of nothing.
+    """
+
+    name: str
+    words: list[object]
+    at_work: Callable[[Path], bool] = lambda out: True
+    naming: str = "(?!)"
+
+
+def of_command(command: Command, how: signal.Signals, place: Path) -> Row:
     """One of the workers of a command is killed or stopped from outside."""
     begun = time.perf_counter()
-    log = place / f"{how.name}.txt"
-    log.unlink(missing_ok=True)
-    process = started(words, variables, log)
-    if wait_for(lambda: len(workers_of(process.pid)) > 1, STARTS_S) > STARTS_S:
-        raise RuntimeError(f"{name} has no workers:\n{log.read_text()[-2000:]}")
-    # Until they are at a task, not only at their imports.
-    time.sleep(2.0)
-    victim = workers_of(process.pid)[0]
-    os.kill(victim, how)
-    # A study goes on with its other jobs: it is named while they run, and ended here.
-    named_s = wait_for(lambda: str(victim) in log.read_text(), 60.0)
-    wait_for(lambda: process.poll() is not None, 2.0)
-    process.kill()
-    process.wait()
-    orphans = orphans_after(process.pid, LIMIT_S)
-    told = re.split(r"[\r\n]+", log.read_text())
-    sentence = next((line for line in told if str(victim) in line), "nothing")
+    name = f"{command.name} {how.name}".replace(" ", "-")
+    log, out = place / f"{name}.txt", place / name
+    variables = environment(place / "cache", OMP_NUM_THREADS="1")
+    process = started([*SHOTENV, *command.words, "--out", out], variables, log)
+
+    def named() -> str | None:
+        lines = re.split(r"[\r\n]+", log.read_text())
+        saying = re.compile(rf"\b{victim}\b|{command.naming}")
+        return next((line for line in lines if saying.search(line)), None)
+
+    try:
+        begins_s = wait_for(
+            lambda: len(workers_of(process.pid)) > 1 and command.at_work(out), STARTS_S
+        )
+        if begins_s > STARTS_S:
+            raise RuntimeError(f"{command.name} has no workers:\n{log.read_text()[-2000:]}")
+        time.sleep(2.0)
+        victim = workers_of(process.pid)[0]
+        os.kill(victim, how)
+        # A study goes on with its other jobs: it is named while they run, and ended here.
+        named_s = wait_for(lambda: named() is not None, 60.0)
+        wait_for(lambda: process.poll() is not None, 2.0)
+    finally:
+        process.kill()
+        process.wait()
+        orphans = orphans_after(process.pid, LIMIT_S)
     return Row(
         10,
-        f"{name}: a worker gets {how.name}",
+        f"`shotenv {command.name}`: a worker gets {how.name}",
         {
             "named after, s": round(named_s, 1) if named_s < 60 else "never",
             "processes left": len(orphans),
-            "said": re.sub(r"\S*/", "", sentence)[:160],
+            # Without the progress bar before it, and without folders.
+            "said": re.sub(r"^.*(?=shotenv: )|\S*/", "", named() or "nothing")[:160],
         },
-        named_s <= LIMIT_S and not orphans and not any("Traceback" in line for line in told),
+        named_s <= LIMIT_S and not orphans and "Traceback" not in log.read_text(),
         time.perf_counter() - begun,
     )
 
@@ -132,10 +163,14 @@ def of_vector(name: str, makes: list[Callable[[], gymnasium.Env]], how: int | No
         error = f"{type(raised).__name__}: {raised}".splitlines()[0]
     named_s = time.monotonic() - asked
     pids = [process.pid for process in envs.processes]
-    envs.close_extras(terminate=True)
-    for process in multiprocessing.active_children():
-        process.kill()  # A stopped one does not see that it is asked to end.
+    for process in envs.processes:
+        # A stopped one does not see that it is asked to end: `close(terminate=True)` would wait.
+        process.kill()
         process.join(1.0)
+    # Nor does `close` cope with pipes whose ends are gone.
+    for pipe in envs.parent_pipes:
+        pipe.close()
+    envs.closed = True
     left = [pid for pid in pids if Path(f"/proc/{pid}").exists()]
     return Row(
         10,
@@ -174,29 +209,38 @@ def of_threads() -> Row:
     )
 
 
+def commands(place: Path) -> list[Command]:
+    """Long enough that workers are at work when they are hit."""
+    small = write_small_bank_config(place, train_clips=200)
+    study = study_files(place, seeds=list(range(40)))
+    network = {"width": 4, "epochs": 10_000, "batch_size": 4, "devices": 2}
+    train = [f"--{name}={value}" for name, value in network.items()]
+    bank = tiny_problem(place)["bank"]
+    return [
+        Command("render", ["render", "--config", small, "--workers", 2]),
+        Command("study", ["study", study, "--workers", 2]),
+        Command(
+            "unwrap train --devices 2",
+            ["unwrap", "train", "--bank", bank, *train],
+            lambda out: (out / "tofregnet.ckpt").is_file(),
+            r"process \d of 2 (failed|hangs)",
+        ),
+    ]
+
+
 def measure(progress: Progress) -> list[Row]:
-    rows = [of_threads()]
+    rows = [progress.row(10, "threads", of_threads)]
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
-        variables = environment(place / "cache", OMP_NUM_THREADS="1")
-        # Long enough that workers are at work when they are hit.
-        small = write_small_bank_config(place, train_clips=200)
-        study = study_files(place, seeds=list(range(40)))
-        commands: dict[str, list[object]] = {
-            "`shotenv render`": [*SHOTENV, "render", "--config", small],
-            "`shotenv study`": [*SHOTENV, "study", study],
-        }
-        for name, words in commands.items():
-            for number, how in enumerate((signal.SIGKILL, signal.SIGSTOP)):
-                out = place / f"{words[3]}{number}"
-                told = [*words, "--workers", 2, "--out", out]
-                rows.append(of_command(name, told, how, place, variables))
-                progress(str(rows[-1]))
+        for command in commands(place):
+            for how in (signal.SIGKILL, signal.SIGSTOP):
+                name = f"{command.name}, {how.name}"
+                rows.append(progress.row(10, name, partial(of_command, command, how, place)))
         for what, makes, signalled in (
             ("one raises", [plain_env, failing_env], None),
             ("one gets SIGKILL", [plain_env, plain_env], signal.SIGKILL),
             ("one gets SIGSTOP", [plain_env, plain_env], signal.SIGSTOP),
         ):
-            rows.append(of_vector(what, makes, signalled))
-            progress(str(rows[-1]))
+            make = partial(of_vector, what, makes, signalled)
+            rows.append(progress.row(10, f"AsyncVectorEnv, {what}", make))
     return rows

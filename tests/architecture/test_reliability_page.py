@@ -55,6 +55,38 @@ def test_what_is_kept_comes_back_and_is_shown(monkeypatch, tmp_path):
     assert "| 1.2 min | " in text
 
 
+def test_an_interrupted_measurement_goes_on(monkeypatch, tmp_path):
+    monkeypatch.setattr(rows, "KEPT", tmp_path)
+    said, asked = [], []
+
+    def measured(broken: bool) -> list[Row]:
+        progress = Progress(say=said.append, parts=rows.parts_of("rows"))
+
+        def second() -> Row:
+            asked.append("second")
+            if broken:
+                raise OSError("no such device")
+            return ROW
+
+        def first() -> Row:
+            asked.append("first")
+            return ROW
+
+        return [progress.row(9, "first", first), progress.row(9, "second", second)]
+
+    found = measured(broken=True)
+    assert found[0] == ROW and not found[1].holds
+    assert found[1].found == {"could not be measured": "OSError: no such device"}
+    rows.keep("rows", found, 1.0)
+    # A process that was killed as it wrote.
+    with rows.parts_of("rows").open("a") as file:
+        file.write('\n["second", {"promi')
+    assert measured(broken=False) == [ROW, ROW]
+    assert asked == ["first", "second", "second"]
+    rows.keep("rows", [ROW, ROW], 1.0)
+    assert [path.name for path in tmp_path.iterdir()] == ["rows.json"]
+
+
 def test_a_trial_is_small():
     assert Progress().size(100, 2) == 100 and Progress(quick=True).size(100, 2) == 2
 

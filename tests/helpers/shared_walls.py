@@ -56,6 +56,13 @@ def deadly_walls(split: str) -> SharedWalls:
     return walls(split)
 
 
+def stopping_walls(split: str) -> SharedWalls:
+    """The same; the second of several processes is stopped as it asks for the frames."""
+    if os.environ.get("LOCAL_RANK") == "1":
+        os.kill(os.getpid(), signal.SIGSTOP)
+    return walls(split)
+
+
 def train_two(out: str) -> None:
     """Train on two processes for long, for a test that interrupts this one."""
     from pathlib import Path

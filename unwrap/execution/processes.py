@@ -8,22 +8,18 @@ import multiprocessing
 import pickle
 import signal
 import sys
-import time
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from multiprocessing.connection import Connection, wait
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from unwrap.execution.cores import available_cores
 from unwrap.execution.work import Done, Failure, Outcome, Work
-from unwrap.support import end_with_parent
+from unwrap.support import StoppedWatch, end_with_parent
 
 CHECK_S = 1.0
 """How often workers are looked at while none of them has anything to say."""
-STOPPED_LIMIT_S = 5.0
-"""After this long a stopped worker counts as hung."""
 
 
 def run_in_processes(
@@ -108,7 +104,7 @@ class _Worker:
             self._process.start()
         # Closed here, so that the end of the process ends the pipe.
         theirs.close()
-        self._last_seen_s = time.monotonic()
+        self._watch = StoppedWatch(self._process.pid)
         self.tasks_left = tasks_left
         self.task: Any = None
 
@@ -129,10 +125,7 @@ class _Worker:
 
     def hung(self) -> Outcome | None:
         """The end of a process that has been stopped (SIGSTOP) for some seconds, None of others."""
-        now = time.monotonic()
-        if not _is_stopped(self._process.pid):
-            self._last_seen_s = now
-        elif now - self._last_seen_s > STOPPED_LIMIT_S:
+        if self._watch.hangs():
             return self._lost(f"hangs: worker {self._process.pid} was stopped")
         return None
 
@@ -196,14 +189,3 @@ def _serve(pipe: Connection, pickled: bytes, threads: int) -> None:
             pipe.send(outcome)
         except Exception as error:  # a result that cannot be pickled
             pipe.send(work.failed(error))
-
-
-def _is_stopped(pid: int | None) -> bool:
-    """Whether a signal has stopped the process; known on Linux only."""
-    if sys.platform != "linux":
-        return False
-    try:
-        status = Path(f"/proc/{pid}/stat").read_text()
-    except OSError:
-        return False
-    return status.rpartition(")")[2].split()[0] in "Tt"

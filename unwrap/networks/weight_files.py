@@ -75,7 +75,20 @@ def save_weights(path: Path, network: nn.Module, metadata: Mapping[str, Any]) ->
     words = {
         key: value if isinstance(value, str) else json.dumps(value) for key, value in values.items()
     }
-    write_bytes(path, save(tensors, words))
+    write_bytes(path, _in_order(save(tensors, words)))
+
+
+def _in_order(content: bytes) -> bytes:
+    """The same file with its words by their names: equal networks are equal files.
+
+    safetensors leaves their order to chance.
+    """
+    end = 8 + int.from_bytes(content[:8], "little")
+    header = json.loads(content[8:end])
+    header["__metadata__"] = dict(sorted(header["__metadata__"].items()))
+    told = json.dumps(header, separators=(",", ":"), ensure_ascii=False).encode()
+    told += b" " * (-len(told) % 8)
+    return len(told).to_bytes(8, "little") + told + content[end:]
 
 
 def _stored_type(tensor: Tensor) -> torch.dtype:

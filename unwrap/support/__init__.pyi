@@ -39,6 +39,7 @@ from .section import (
     Section as Section,
     check_range as check_range,
 )
+from .stopped_process import StoppedWatch as StoppedWatch
 from .tensors import (
     concatenate as concatenate,
     mapped as mapped,

@@ -16,10 +16,13 @@ import torch
 from torch import multiprocessing
 from torch.multiprocessing.spawn import ProcessException
 
-from unwrap.support import end_with_parent
+from unwrap.support import StoppedWatch, end_with_parent
 
 OUTSIDE = ("MASTER_ADDR", "MASTER_PORT", "NODE_RANK")
 """Environment variables by which machines find each other."""
+
+CHECK_S = 1.0
+"""How often processes are looked at."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +105,7 @@ def run_team(team: Team, function: Callable[..., None], *arguments: Any) -> None
     Raises
     ------
     RuntimeError
-        One of them raised or died; the message tells which.
+        One of them raised, died or was stopped; the message tells which.
     """
     place = {
         "MASTER_ADDR": "127.0.0.1",
@@ -119,9 +122,16 @@ def run_team(team: Team, function: Callable[..., None], *arguments: Any) -> None
         daemon=True,
         start_method="spawn",
     )
+    watches = [StoppedWatch(pid) for pid in processes.pids()]
     try:
-        while not processes.join():
-            pass
+        while not processes.join(CHECK_S):
+            for rank, watch in enumerate(watches):
+                # The others wait for it, and would for minutes.
+                if watch.hangs():
+                    raise RuntimeError(
+                        f"process {rank} of {team.devices} hangs: {processes.pids()[rank]} was "
+                        "stopped"
+                    )
     except ProcessException as error:
         last = str(error).strip().splitlines()[-1]
         failure = RuntimeError(f"process {error.error_index} of {team.devices} failed: {last}")

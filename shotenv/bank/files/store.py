@@ -148,8 +148,9 @@ def _write_flushed(path: Path, write: Callable[[BinaryIO], object]) -> str:
             write(file)
             file.flush()
             os.fsync(file.fileno())
-    except OSError as error:  # NumPy's tells neither the file nor a number.
-        raise OSError(error.errno, error.strerror or str(error), str(path)) from None
+    except OSError as error:  # NumPy's tells neither the file nor a number, nor that it is full.
+        why = error.strerror or f"{error}; is the disk full?"
+        raise OSError(error.errno, why, str(path)) from None
     return sha256_of(path)
 
 

@@ -15,11 +15,11 @@ import torch_tasks
 import worker_tasks
 from watched_processes import is_alive, wait_until
 
-from unwrap.execution import processes
 from unwrap.execution.cores import available_cores
 from unwrap.execution.places import visible
 from unwrap.execution.tasks import run_tasks
 from unwrap.execution.work import WorkerError
+from unwrap.support import stopped_process
 
 
 def test_tasks_come_back_with_their_results_from_replaced_workers():
@@ -56,7 +56,7 @@ def test_leaving_the_loop_ends_the_workers():
     ],
 )
 def test_a_failing_task_is_named_within_ten_seconds(function, message, monkeypatch):
-    monkeypatch.setattr(processes, "STOPPED_LIMIT_S", 1.0)
+    monkeypatch.setattr(stopped_process, "STOPPED_LIMIT_S", 1.0)
     results = run_tasks(function, [1, 3], workers=1)
     assert next(results) == (1, 1)
     start = time.monotonic()

@@ -36,6 +36,14 @@ def test_shipped_networks_are_small_and_say_what_they_are(name):
     assert unwrapper.metadata["f1_hz"] == 24e6
 
 
+def test_equal_networks_are_equal_files(path):
+    one, content = load_unwrapper(path), path.read_bytes()
+    for _ in range(5):  # The library orders six words by chance.
+        save_weights(path, one.network, metadata(one.name))
+        assert path.read_bytes() == content
+    assert load_unwrapper(path).metadata == one.metadata
+
+
 def test_a_label_tells_the_weights_without_loading_them(path, monkeypatch):
     unwrapper = load_unwrapper(path)
     monkeypatch.setattr("unwrap.networks.predictor.load_weights", None)

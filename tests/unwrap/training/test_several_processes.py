@@ -15,7 +15,7 @@ import psutil
 import pytest
 import shared_walls
 import torch
-from shared_walls import FRAMES, deadly_walls, precise_walls, walls
+from shared_walls import FRAMES, deadly_walls, precise_walls, stopping_walls, walls
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from unwrap.networks.registry import NetworkName
@@ -177,10 +177,17 @@ class StoppingWalls:
 
 
 @pytest.mark.slow
-def test_a_process_that_dies_is_named(tmp_path):
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        (deadly_walls, r"process 1 of 2 failed: .*SIGKILL"),
+        (stopping_walls, r"process 1 of 2 hangs: \d+ was stopped"),
+    ],
+)
+def test_a_process_that_dies_or_stops_is_named(source, message, tmp_path):
     begun = time.monotonic()
-    with pytest.raises(RuntimeError, match=r"process 1 of 2 failed: .*SIGKILL"):
-        train(CONFIG, deadly_walls, tmp_path, devices=2, progress=False)
+    with pytest.raises(RuntimeError, match=message):
+        train(CONFIG, source, tmp_path, devices=2, progress=False)
     assert time.monotonic() - begun < 120
 
 

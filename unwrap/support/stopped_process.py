@@ -1,0 +1,36 @@
+"""Workers that a signal has stopped: they keep silent, and would be waited for without end."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+STOPPED_LIMIT_S = 5.0
+"""After this long a stopped process counts as hung."""
+
+
+class StoppedWatch:
+    """Looks at a process now and then, and says whether it hangs."""
+
+    def __init__(self, pid: int | None):
+        self._pid = pid
+        self._last_seen_s = time.monotonic()
+
+    def hangs(self) -> bool:
+        """Whether the process has been stopped (SIGSTOP) for some seconds; ask every second."""
+        now = time.monotonic()
+        if not _is_stopped(self._pid):
+            self._last_seen_s = now
+        return now - self._last_seen_s > STOPPED_LIMIT_S
+
+
+def _is_stopped(pid: int | None) -> bool:
+    """Whether a signal has stopped the process; known on Linux only."""
+    if sys.platform != "linux":
+        return False
+    try:
+        status = Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return False
+    return status.rpartition(")")[2].split()[0] in "Tt"
