@@ -17,7 +17,7 @@ import torch
 
 from reliability.rows import ROOT
 
-sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "helpers")]
+sys.path.insert(0, str(ROOT / "tests" / "helpers"))
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def _read_ego(path: Path) -> object:
 
 def _bank(name: str) -> Callable[[Path], Path]:
     def make(folder: Path) -> Path:
-        from conftest import write_tiny_bank
+        from tiny_banks import write_tiny_bank
 
         from shotenv.config import SensorConfig, find_config, read_config
 
@@ -156,7 +156,7 @@ def _read_thinned(path: Path) -> object:
 
 def _recorded(name: str) -> Callable[[Path], Path]:
     def make(folder: Path) -> Path:
-        from conftest import write_tiny_bank
+        from tiny_banks import write_tiny_bank
         from word_banks import record, write_folder
 
         from agents.cli.cameras import read_camera

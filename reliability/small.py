@@ -10,7 +10,7 @@ import yaml
 
 from reliability.processes import SHOTENV, environment
 from shotenv.config import EnvConfig, SensorConfig, configs_dir, find_config, read_config
-from tests.conftest import write_tiny_bank
+from tests.helpers.tiny_banks import write_tiny_bank
 from unwrap.networks import TofRegNet, save_weights
 
 

@@ -128,7 +128,7 @@ def _parsed(command: Command, words: list[str]) -> Namespace:
     except (ArgumentError, ValueError, TypeError) as error:
         raise ConfigError(_plain(one_sentence(error))) from None
     # Before minutes are spent on what could not be written then.
-    check_outputs(parser, arguments)
+    check_outputs(arguments, out_is_file=command.out_is_file)
     return arguments
 
 

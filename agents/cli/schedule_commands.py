@@ -273,5 +273,6 @@ COMMANDS = (
         "write the report of an evaluation anew, or compare several on one page",
         report_arguments,
         report,
+        out_is_file=True,
     ),
 )

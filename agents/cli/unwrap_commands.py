@@ -237,5 +237,6 @@ COMMANDS: tuple[Command, ...] = (
         "write a network as ONNX and check it against torch",
         export_arguments,
         export_network,
+        out_is_file=True,
     ),
 )

@@ -174,7 +174,7 @@ def run_job(task: JobTask) -> None:
     """
     if task.url is not None:
         with tempfile.TemporaryDirectory() as scratch:
-            here = task._replace(folder=Path(scratch), url=None)
+            here = JobTask(task.job, Path(scratch), task.depends_on)
             if task.job.source is not None:
                 fetch_scheduler(task.url, task.job.source, here.folder)
             with training_kept(task.url, task.job, task.depends_on, here.folder):

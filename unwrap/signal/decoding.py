@@ -135,8 +135,10 @@ def quadratures(
     if offset_lsb is not None:
         require_floats(offset_lsb=offset_lsb)
         size = (*dcs.shape[:-3], *dcs.shape[-2:])
-        if tuple(offset_lsb.shape) != size[len(size) - offset_lsb.ndim :]:
-            shape = tuple(offset_lsb.shape)
+        shape = tuple(offset_lsb.shape)
+        # An axis of one is common to all frames, as is one that is not there.
+        pairs = zip(reversed(shape), reversed(size), strict=False)
+        if len(shape) > len(size) or any(one not in (1, whole) for one, whole in pairs):
             raise ValueError(f"offset_lsb has shape {shape}; expected {size}, or its last axes")
     return _by_loop(dcs, offset_lsb) if can_loop(dcs) else _by_torch(dcs, offset_lsb)
 

@@ -230,4 +230,5 @@ CALIBRATE = Command(
     "measure a camera by its recordings: a sensor to simulate, and a page",
     calibrate_arguments,
     calibrate,
+    out_is_file=True,
 )

@@ -31,6 +31,8 @@ class Command:
         Does the work with the parsed arguments and returns the exit status.
     resumes : bool
         Whether the same command continues where an interrupted one stopped.
+    out_is_file : bool
+        Whether its `--out` is a file; else it is a folder.
     """
 
     words: str
@@ -38,6 +40,7 @@ class Command:
     arguments: Callable[[ArgumentParser], None]
     action: Callable[[Namespace], int]
     resumes: bool = False
+    out_is_file: bool = False
 
     def parser(self) -> ArgumentParser:
         """Parser of the command's own arguments."""

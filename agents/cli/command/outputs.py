@@ -6,18 +6,21 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from jsonargparse import ArgumentParser, Namespace
+from jsonargparse import Namespace
 
 from shotenv.config import ConfigError
 
-OUTPUTS = ("json", "out", "page", "sheet", "mcap", "rrd")
-"""Arguments that name what is written, in every command that has them: a file or, where their
-metavar says so, a folder."""
-FOLDERS = ("DIR", "FOLDER")
+FILES, FOLDERS = ("json", "sheet", "mcap", "rrd"), ("out", "page")
+"""Arguments that name what is written, in every command that has them."""
 
 
-def check_outputs(parser: ArgumentParser, arguments: Namespace) -> None:
+def check_outputs(arguments: Namespace, *, out_is_file: bool = False) -> None:
     """Refuse places that cannot be written to; nothing is made or changed.
+
+    Parameters
+    ----------
+    out_is_file : bool
+        Whether `--out` of this command is a file; of most it is a folder.
 
     Raises
     ------
@@ -25,7 +28,8 @@ def check_outputs(parser: ArgumentParser, arguments: Namespace) -> None:
         A folder where a file is wanted, a file where a folder is, or one within a file or a folder
         that may not be written to; the message names argument and place.
     """
-    for name, path, is_folder in _outputs(parser, arguments):
+    for name, path in _outputs(arguments):
+        is_folder = name in FOLDERS and not (name == "out" and out_is_file)
         if is_folder and path.exists() and not path.is_dir():
             raise ConfigError(f"{name} is {path}, which is a file; expected a folder")
         if not is_folder and path.is_dir():
@@ -42,10 +46,10 @@ def check_outputs(parser: ArgumentParser, arguments: Namespace) -> None:
             )
 
 
-def _outputs(parser: ArgumentParser, arguments: Namespace) -> Iterator[tuple[str, Path, bool]]:
-    """Name of each argument that names an output, the path, and whether a folder is wanted."""
-    for action in parser._actions:
-        path = arguments.get(action.dest) if action.dest in OUTPUTS else None
+def _outputs(arguments: Namespace) -> Iterator[tuple[str, Path]]:
+    """Name of each argument that names an output, and the path."""
+    for name in (*FILES, *FOLDERS):
+        path = arguments.get(name)
         # What begins with a scheme is no path of this machine.
         if path is not None and "://" not in str(path):
-            yield action.dest, Path(path), action.metavar in FOLDERS
+            yield name, Path(path)

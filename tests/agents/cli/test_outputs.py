@@ -7,7 +7,7 @@ import warnings
 import pytest
 from jsonargparse import ArgumentParser
 
-from agents.cli.command.outputs import FOLDERS, OUTPUTS
+from agents.cli.command.outputs import FILES, FOLDERS
 from agents.cli.entry import COMMANDS, main
 from agents.policies.scheduler_files import UnboundSchedulerWarning
 
@@ -16,8 +16,8 @@ def arguments_that_write():
     for command in COMMANDS:
         parser = command.parser()
         for action in parser._actions:
-            if action.dest in OUTPUTS:
-                yield command, action.dest, action.metavar in FOLDERS
+            if action.dest in (*FILES, *FOLDERS):
+                yield command, action.dest, action.metavar in ("DIR", "FOLDER")
 
 
 FOUND = list(arguments_that_write())
@@ -39,7 +39,7 @@ def words_of(command, name, place):
 
 def test_most_commands_write():
     assert len(FOUND) > 25
-    assert {name for _, name, _ in FOUND} == set(OUTPUTS)
+    assert {name for _, name, _ in FOUND} == {*FILES, *FOLDERS}
 
 
 @pytest.mark.parametrize(

@@ -221,7 +221,7 @@ def test_the_command_line(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     for words, code, names in (
         ((tmp_path / "none",), 1, "holds no scheduler"),
-        ((agent, "--out", tmp_path / "file" / "out", "--c-only"), 1, "file"),
+        ((agent, "--out", tmp_path / "file" / "out", "--c-only"), 2, "file"),
         ((agent, "--modes", "8=1"), 2, "modes are of a cycle"),
         (("cycle:4:8:2",), 1, "no mode for 2, 8 samples"),
         (("cycle:4:7:2", "--modes", "8=1"), 1, "shots is 7"),

@@ -177,7 +177,7 @@ def test_checkpoints_of_other_prices_are_refused(tmp_path):
 
 @pytest.mark.parametrize(
     ("price", "says"),
-    [((0.2, 0.1), "low <= high"), ((0.0, 0.1), "above 0"), ((0.1, math.inf), "finite")],
+    [((0.2, 0.1), "low <= high"), ((0.0, 0.1), "above 0"), ((0.1, math.inf), "at most")],
 )
 def test_impossible_prices_are_refused(price, says):
     with pytest.raises(ValueError, match=f"power_price is .*{says}"):
