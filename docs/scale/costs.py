@@ -25,11 +25,12 @@ def each(found: dict[str, Any]) -> str:
     for name, subject in SUBJECTS.items():
         points = found["points"][name]
         start_s, each_s = fitted(points)
-        memory = " to ".join(dict.fromkeys(f"{points[end]['memory_mb']:.0f}" for end in (0, -1)))
+        held = [f"{point['memory_mb']:.0f}" for point in points if "memory_mb" in point]
+        memory = f"{' to '.join(dict.fromkeys((held[0], held[-1])))} MB" if held else ""
         sizes = f"{points[0]['size']:,.0f} to {points[-1]['size']:,.0f}"
         lines.append(
             f"| {subject.what} ({sizes}) | {subject.unit} | {duration(each_s)} "
-            f"| {max(start_s, 0):.1f} s | {memory} MB |"
+            f"| {max(start_s, 0):.1f} s | {memory} |"
         )
     return "\n".join(lines)
 

@@ -95,8 +95,9 @@ def _require_fitting(
     moments = states[0].get("state") if isinstance(states, list) and states else None
     if not isinstance(moments, dict) or not set(moments) <= set(range(len(parameters))):
         raise _UnfitError("its optimizer_states are not those of the network")
+    step = torch.zeros((), dtype=torch.float32)  # AdamW counts so, whatever the default is.
     like = {
-        number: {"step": torch.zeros(()), "exp_avg": tensor, "exp_avg_sq": tensor}
+        number: {"step": step, "exp_avg": tensor, "exp_avg_sq": tensor}
         for number, tensor in enumerate(parameters)
         if number in moments  # What had no gradient yet has none.
     }
