@@ -15,6 +15,23 @@ from typing import Any
 import numpy as np
 import torch
 
+from reliability.hostile_recordings import (
+    camera,
+    picture,
+    rays,
+    read_camera,
+    read_pictures,
+    read_rays,
+    read_recording,
+    read_scene,
+    read_truth,
+    read_wiggle,
+    recording,
+    scene,
+    truth,
+    wiggle,
+    xml,
+)
 from reliability.rows import ROOT
 
 sys.path.insert(0, str(ROOT / "tests" / "helpers"))
@@ -347,146 +364,6 @@ def _read_report(path: Path) -> object:
     return write_report(path.parent)
 
 
-def _wiggle(folder: Path) -> Path:
-    from unwrap.signal.shots import harmonic_weights
-    from unwrap.signal.wiggle import wiggle_of, write_wiggle
-
-    table = wiggle_of(harmonic_weights(1.0, 7))
-    write_wiggle(folder / "wiggle.json", {24e6: table, 10e6: table})
-    return folder / "wiggle.json"
-
-
-def _read_wiggle(path: Path) -> object:
-    from unwrap.signal.wiggle import read_wiggle
-
-    return read_wiggle(path)
-
-
-def _samples() -> np.ndarray:
-    return (2048 + 500 * np.random.default_rng(0).standard_normal((2, 4, 8, 12))).astype(np.uint16)
-
-
-def _recording(name: str) -> Callable[[Path], Path]:
-    def make(folder: Path) -> Path:
-        path, dcs = folder / name, _samples()
-        if path.suffix == ".npy":
-            np.save(path, dcs)
-        else:
-            np.savez(path, dcs=dcs, gray=dcs[:, 0])
-        return path
-
-    return make
-
-
-def _read_recording(path: Path) -> object:
-    from unwrap.recordings import load_recording
-
-    return load_recording(path, unwrapped=path.suffix == ".npz")
-
-
-def _picture(folder: Path) -> Path:
-    from PIL import Image
-
-    for number in range(4):
-        Image.fromarray(_samples()[0, number]).save(folder / f"dcs_{number}.png")
-    return folder / "dcs_2.png"
-
-
-def _read_pictures(path: Path) -> object:
-    from unwrap.recordings import load_recording
-
-    return load_recording(path.parent, unwrapped=False)
-
-
-def _rays(folder: Path) -> Path:
-    rays = np.random.default_rng(0).standard_normal((6, 8, 3))
-    np.save(folder / "rays.npy", rays / np.linalg.norm(rays, axis=-1, keepdims=True))
-    return folder / "rays.npy"
-
-
-def _read_rays(path: Path) -> object:
-    from unwrap.cameras.pixel_rays import _table
-
-    return _table(path, (6, 8))
-
-
-def _truth(folder: Path) -> Path:
-    np.save(folder / "truth.npy", np.full((2, 6, 8), 3.0, np.float32))
-    return folder / "truth.npy"
-
-
-def _read_truth(path: Path) -> object:
-    from shotenv.recorded.frame_tables import read_truth
-
-    return read_truth(path, (2, 6, 8))
-
-
-LAYOUT = {"height": 16, "width": 24, "row_bytes": 40, "trailer_rows": 3}
-DISTANCES = [np.full((16, 24), metres) for metres in (1.5, 2.5)]
-
-
-def _camera(camera: str, name: str) -> Callable[[Path], Path]:
-    def make(folder: Path) -> Path:
-        import camera_files as files
-
-        path, frequencies_hz = folder / name, {"arducam_b0548": (90e6, 15e6)}.get(camera, (24e6,))
-        if camera == "kinect_v2":
-            frames = 100 * np.random.default_rng(0).standard_normal((1, 9, *files.KINECT_SIZE))
-            files.write_kinect(path, frames)
-            return path
-        family = "arducam_b0548" if camera == "arducam_b0548" else "epc660"
-        planes = files.whole(files.planes(family, DISTANCES, frequencies_hz))
-        if camera == "arducam_b0548":
-            files.small_camera(folder, camera, layout=LAYOUT)
-            trailer = bytes(LAYOUT["trailer_rows"] * LAYOUT["row_bytes"])
-            files.write_raw12(path, planes, row_bytes=LAYOUT["row_bytes"], trailer=trailer)
-        elif camera == "epc660_wire":
-            files.write_wire(path, planes[:, 0])
-        else:
-            files.write_espros(path, planes[:, 0])
-        return path
-
-    return make
-
-
-def _read_camera(camera: str) -> Callable[[Path], object]:
-    def read(path: Path) -> object:
-        from agents.cli.cameras import read_camera
-        from unwrap.cameras import open_camera_recording
-
-        small = path.parent / f"{camera}_small.yaml"
-        described, _ = read_camera(str(small) if small.is_file() else camera)
-        return list(open_camera_recording(path, described).pieces())
-
-    return read
-
-
-def _scene(name: str) -> Callable[[Path], Path]:
-    def make(folder: Path) -> Path:
-        from scene_files import write_mesh, write_obj
-
-        corners = np.random.default_rng(0).random((12, 3, 3)) + np.arange(12)[:, None, None]
-        path = folder / name
-        return write_obj(path, corners) if path.suffix == ".obj" else write_mesh(path, corners)
-
-    return make
-
-
-def _xml(folder: Path) -> Path:
-    from scene_files import write_xml
-
-    shade = '<bsdf type="diffuse"><spectrum name="reflectance" value="0.4"/></bsdf>'
-    return write_xml(folder / "scene.xml", f'<shape type="rectangle">{shade}</shape>' * 3)
-
-
-def _read_scene(path: Path) -> object:
-    from scene_files import scene_config
-
-    from shotenv.scenes.scene_worlds import read_scene
-
-    return read_scene(scene_config(path))
-
-
 KINDS = (
     Kind(
         "environment (YAML)", _config("env", "default"), _read_config("shotenv.config", "EnvConfig")
@@ -543,20 +420,20 @@ KINDS = (
     Kind("evaluation's timeline", _report("timeline.json"), _read_report, 0.1),
     Kind("evaluation's choices", _report("choices.json"), _read_report, 0.1),
     Kind("evaluation's frames", _report("frames.npz"), _read_report),
-    Kind("wiggle table", _wiggle, _read_wiggle),
-    Kind("recording (npy)", _recording("frames.npy"), _read_recording),
-    Kind("recording (npz)", _recording("frames.npz"), _read_recording),
-    Kind("recording (PNG)", _picture, _read_pictures),
-    Kind("rays of pixels", _rays, _read_rays),
-    Kind("reference", _truth, _read_truth),
+    Kind("wiggle table", wiggle, read_wiggle),
+    Kind("recording (npy)", recording("frames.npy"), read_recording),
+    Kind("recording (npz)", recording("frames.npz"), read_recording),
+    Kind("recording (PNG)", picture, read_pictures),
+    Kind("rays of pixels", rays, read_rays),
+    Kind("reference", truth, read_truth),
     Kind("ego motion (CSV)", _ego, _read_ego),
-    Kind("recording (HDF5)", _camera("epc660_hdf5", "log.h5"), _read_camera("epc660_hdf5")),
-    Kind("recording (wire)", _camera("epc660_wire", "log.bin"), _read_camera("epc660_wire")),
-    Kind("recording (raw)", _camera("arducam_b0548", "log.raw"), _read_camera("arducam_b0548")),
-    Kind("recording (Kinect)", _camera("kinect_v2", "log.h5"), _read_camera("kinect_v2")),
-    Kind("scene (OBJ)", _scene("scene.obj"), _read_scene),
-    Kind("scene (PLY)", _scene("scene.ply"), _read_scene),
-    Kind("scene (STL)", _scene("scene.stl"), _read_scene),
-    Kind("scene (GLB)", _scene("scene.glb"), _read_scene),
-    Kind("scene (XML)", _xml, _read_scene),
+    Kind("recording (HDF5)", camera("epc660_hdf5", "log.h5"), read_camera("epc660_hdf5")),
+    Kind("recording (wire)", camera("epc660_wire", "log.bin"), read_camera("epc660_wire")),
+    Kind("recording (raw)", camera("arducam_b0548", "log.raw"), read_camera("arducam_b0548")),
+    Kind("recording (Kinect)", camera("kinect_v2", "log.h5"), read_camera("kinect_v2")),
+    Kind("scene (OBJ)", scene("scene.obj"), read_scene),
+    Kind("scene (PLY)", scene("scene.ply"), read_scene),
+    Kind("scene (STL)", scene("scene.stl"), read_scene),
+    Kind("scene (GLB)", scene("scene.glb"), read_scene),
+    Kind("scene (XML)", xml, read_scene),
 )

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal, Self
 
@@ -137,6 +137,14 @@ class TableOfContents(BaseModel):
         raise NotImplementedError
 
 
+def fingerprint_of(clips: Iterable[ClipRecord | RecordedClip]) -> str:
+    """Changes when any array of the clips changes."""
+    digest = hashlib.sha256()
+    for clip in clips:
+        digest.update(json.dumps([clip.name, sorted(clip.sha256.items())]).encode())
+    return digest.hexdigest()[:16]
+
+
 class Manifest(TableOfContents):
     """Table of contents of a rendered bank."""
 
@@ -151,10 +159,7 @@ class Manifest(TableOfContents):
     @property
     def fingerprint(self) -> str:
         """See `TableOfContents.fingerprint`."""
-        digest = hashlib.sha256()
-        for clip in self.clips:
-            digest.update(json.dumps([clip.name, sorted(clip.sha256.items())]).encode())
-        return digest.hexdigest()[:16]
+        return fingerprint_of(self.clips)
 
 
 class StoredNetwork(BaseModel):
@@ -233,10 +238,7 @@ class RecordedContents(TableOfContents):
     @property
     def fingerprint(self) -> str:
         """See `TableOfContents.fingerprint`."""
-        digest = hashlib.sha256()
-        for clip in self.clips:
-            digest.update(json.dumps([clip.name, sorted(clip.sha256.items())]).encode())
-        return digest.hexdigest()[:16]
+        return fingerprint_of(self.clips)
 
     def arrays(self, frames: int) -> dict[str, tuple[str, tuple[int, ...]]]:
         """Type and shape of each array of a clip of so many frames.
