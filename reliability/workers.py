@@ -167,8 +167,8 @@ def of_vector(name: str, makes: list[Callable[[], gymnasium.Env]], how: int | No
         # A stopped one does not see that it is asked to end: `close(terminate=True)` would wait.
         process.kill()
         process.join(1.0)
-    # Nor does `close` cope with pipes whose ends are gone.
-    for pipe in envs.parent_pipes:
+    # Nor does `close` cope with pipes whose ends are gone; that of one that raised is closed.
+    for pipe in filter(None, envs.parent_pipes):
         pipe.close()
     envs.closed = True
     left = [pid for pid in pids if Path(f"/proc/{pid}").exists()]

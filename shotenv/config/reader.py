@@ -104,11 +104,14 @@ def _complaint(detail: Any, model: type[Section] | None) -> str:
 
 def _unknown(place: Sequence[Any], model: Any) -> str:
     """Refusal of the key at `place`, such as ("reward", "energy"), of the section `model`."""
-    for key in place[:-1]:
-        model = model.model_fields[key].annotation if hasattr(model, "model_fields") else None
-    known = ", ".join(getattr(model, "model_fields", ()))
-    sentence = f"unknown key {'.'.join(map(str, place))}"
-    return f"{sentence}; expected one of {known}" if known else sentence
+    for depth, key in enumerate(place, 1):
+        fields = getattr(model, "model_fields", {})
+        if fields and key not in fields:
+            # What lies below an unknown key is not to be known.
+            known = ", ".join(fields)
+            return f"unknown key {'.'.join(map(str, place[:depth]))}; expected one of {known}"
+        model = fields[key].annotation if fields else None
+    return f"unknown key {'.'.join(map(str, place))}"
 
 
 def merged(base: Model, changes: Mapping[str, Any]) -> Model:
