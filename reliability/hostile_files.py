@@ -21,6 +21,8 @@ from dataclasses import asdict, dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+import torch
+
 from reliability.hostile_kinds import KINDS, Kind
 from reliability.mutations import mutate
 from reliability.rows import Progress, Row
@@ -162,6 +164,8 @@ def _read_all(
     """In the worker: change a copy of the sound file, read it, tell what happened."""
     warnings.simplefilter("ignore")
     _quiet()
+    # The process that this one was forked from may have used torch's threads, which are not here.
+    torch.set_num_threads(1)
     copy = folder / f"copy{os.getpid()}"
     shutil.copytree(good, copy)
     kind.read(copy / relative)

@@ -40,7 +40,7 @@ from shotenv.bank.files import (
 from shotenv.bank.predictions import PredictedDistances
 from shotenv.sensor import Exposure
 from unwrap.networks import WeightsLabel
-from unwrap.support import unfinished, write_bytes
+from unwrap.support import require_regular, unfinished, write_bytes
 
 SKY = np.iinfo(np.uint16).max
 """Stored distance where nothing is hit."""
@@ -48,6 +48,8 @@ FARTHEST_M = (SKY - 1) / 1000
 """Truth beyond is stored as this, metres."""
 LARGEST = 2.0**15
 """What the largest radiance of a bank is stored as, or less by a factor below two."""
+NO_MAP_BYTES = 16_384
+"""More than what is no map takes of a frame, or names and headers of the whole file."""
 LOG_AMBIENT = "log_ambient"
 
 
@@ -70,10 +72,20 @@ class ThinnedBank(Bank):
         super().__init__(folder, read_thinned_contents(Path(folder)))
         about = self.manifest
         units = about.active_unit, about.ambient_unit
-        self._arrays, self._light = _opened(self.folder / THINNED_FILE, about.sha256, *units)
+        path = self.folder / THINNED_FILE
+        self._arrays, self._light = _opened(path, self._most_bytes(), about.sha256, *units)
         shape = (len(self), self.height, self.width)
         if self._arrays["gray"].shape != shape:
-            raise _damaged(self.folder / THINNED_FILE)
+            raise _damaged(path)
+
+    def _most_bytes(self) -> int:
+        """Of the file: its maps and predictions as in memory, and room for what is no map.
+
+        A file of gigabytes in its place is refused before its digest is taken.
+        """
+        maps = sum(each.frame_bytes(self.height, self.width) for each in THINNED_ARRAYS.values())
+        predicted = 2 * self.height * self.width * len(self.manifest.networks)
+        return len(self) * (maps + predicted + NO_MAP_BYTES) + NO_MAP_BYTES
 
     @property
     def every(self) -> int:
@@ -143,13 +155,14 @@ def _picked(maps: Tensor, indices: Tensor) -> Tensor:
 
 @lru_cache(maxsize=2)
 def _opened(
-    path: Path, sha256: str, active_unit: float, ambient_unit: float
+    path: Path, most_bytes: int, sha256: str, active_unit: float, ambient_unit: float
 ) -> tuple[dict[str, Tensor], Exposure]:
     """Arrays of the file `path` that are used as they are stored, and the light made of the others.
 
     Kept for the process, which opens a bank once for each split: nobody changes them.
     """
     try:
+        require_regular(path, most_bytes)
         if sha256_of(path) != sha256:
             raise _damaged(path)
         with np.load(path, allow_pickle=False) as file:

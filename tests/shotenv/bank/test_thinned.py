@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import os
 import pickle
 import shutil
 
@@ -229,6 +230,14 @@ def test_damage_is_found_at_opening_by_name(thinned, tmp_path, capsys, name, dam
         open_bank(folder)
     assert main(["bank", "verify", str(folder)]) == 1
     assert f"{name} is " in capsys.readouterr().err
+
+
+def test_a_file_of_gigabytes_is_refused_before_its_digest_is_taken(thinned, tmp_path, monkeypatch):
+    folder = shutil.copytree(thinned.folder, tmp_path / "swollen")
+    os.truncate(folder / "arrays.npz", 3 << 30)
+    monkeypatch.setattr(thinned_file, "sha256_of", lambda path: pytest.fail("read"))
+    with pytest.raises(BankError, match=r"arrays.npz is missing or damaged"):
+        ThinnedBank(folder)
 
 
 def test_a_whole_bank_passes_verify(thinned, capsys):
