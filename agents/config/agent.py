@@ -60,7 +60,8 @@ class DqnConfig(Section):
 
     total_steps: Count = Field(200_000, description="environment steps in all")
     num_envs: Few = Field(8, description="environments in the batch")
-    buffer_size: Count = Field(200_000, description="steps that are remembered")
+    # At most what a checkpoint may be large: some 200 bytes a step.
+    buffer_size: int = Field(200_000, ge=1, le=10**7, description="steps that are remembered")
     learning_starts: int = Field(2_000, ge=0, le=10**9, description="steps before the first update")
     gradient_steps: Few = Field(2, description="updates per step of all environments")
     batch_size: Batch = Field(128, description="steps per update")

@@ -119,6 +119,8 @@ class Checkpoint:
             if same:
                 restore(tensors)
             state = _STATE.validate_json(words["progress"])
+        except MemoryError:
+            raise ValueError(f"{self.path} is damaged, or too large for this memory") from None
         except (SafetensorError, OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
             raise ValueError(
                 f"{self.path} is damaged ({first_line(error)}); delete it to start anew"

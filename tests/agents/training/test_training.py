@@ -166,6 +166,17 @@ def test_checkpoints_of_other_runs_and_damaged_ones_are_refused(tmp_path):
         make_trainer(tmp_path).run()
 
 
+def test_a_checkpoint_that_does_not_fit_into_the_memory_is_named(tmp_path, monkeypatch):
+    make_trainer(tmp_path).run()
+
+    def full(*_, **__):
+        raise MemoryError("Cannot allocate memory (os error 12)")
+
+    monkeypatch.setattr("agents.training.checkpoint.safe_open", full)
+    with pytest.raises(ValueError, match=r"checkpoint\.safetensors is damaged, or too large"):
+        make_trainer(tmp_path).run()
+
+
 def test_checkpoints_of_other_prices_are_refused(tmp_path):
     make_trainer(tmp_path).run()
     with pytest.raises(ValueError, match="another configuration"):

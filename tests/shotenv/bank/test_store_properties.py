@@ -208,7 +208,8 @@ class StoreMachine(RuleBasedStateMachine):
         path = objects[int(pick * len(objects))]
         whole = path.read_bytes()
         put(path, spoiled(whole, how, place))
-        assert [file.sha256 for file in verify_published(self.url)] == [path.name]
+        # More than one file where clips have the same content.
+        assert {file.sha256 for file in verify_published(self.url)} == {path.name}
         self.forget_what_was_fetched()
         with pytest.raises(StorageError, match=path.name):
             fetch_bank(self.url)
