@@ -26,7 +26,7 @@ from agents.cli import (
 )
 from agents.cli.cameras import CALIBRATE, CORRECT, DESCRIBE, RECORD
 from agents.cli.command import DONE, FAILED, INTERRUPTED, WRONG_USAGE, Command, check_outputs
-from shotenv.config import ConfigError, one_sentence
+from shotenv.config import ConfigError, imports_refused, one_sentence
 
 OWN_PACKAGES = ("agents", "shotenv", "unwrap")
 USUAL_FORMAT = warnings.formatwarning
@@ -124,7 +124,8 @@ def _parsed(command: Command, words: list[str]) -> Namespace:
     """
     parser = command.parser()
     try:
-        arguments = parser.instantiate(parser.parse_args(words))
+        with imports_refused():
+            arguments = parser.instantiate(parser.parse_args(words))
     except (ArgumentError, ValueError, TypeError) as error:
         raise ConfigError(_plain(one_sentence(error))) from None
     # Before minutes are spent on what could not be written then.
