@@ -39,12 +39,12 @@ from unwrap.storage import (
     Listing,
     Place,
     StoredFile,
+    begin,
     damaged_files,
     fetch,
     publish_contents,
     publish_part,
     read_contents,
-    require_label,
     standing_parts,
 )
 from unwrap.support import progress, say, write_json
@@ -72,7 +72,7 @@ def build_published(
         As of `build_bank`.
     """
     place = Place(url)
-    require_label(place, bank_folder(config).name)
+    begin(place, bank_folder(config).name)
     standing = standing_clips(url, config)
     jobs = clip_jobs(config, Path())
     missing = [replace(job, url=url) for job in jobs if job.name not in standing]
@@ -172,7 +172,7 @@ def publish_bank(bank: Bank, url: str) -> Listing:
         label = bank_folder(bank.config).name  # As `publish_clip` has it.
     else:
         label = f"{bank.name}-{bank.fingerprint[:8]}"
-    require_label(place, label)
+    begin(place, label)
     clips = [
         clip.folder for clip in bank.manifest.clips if isinstance(clip, ClipRecord | RecordedClip)
     ]

@@ -97,7 +97,7 @@ def publish_contents(
     StorageError
         The place holds something else, or cannot be written.
     """
-    require_label(place, label)
+    _require_label(place, label)
     rest = stored_files(folder, names)
     for name, file in zip(names, rest, strict=True):
         _upload(place, file, folder / name)
@@ -106,7 +106,7 @@ def publish_contents(
     return listing
 
 
-def require_label(place: Place, label: str) -> None:
+def _require_label(place: Place, label: str) -> None:
     """Refuse a place where something else was published.
 
     Raises
@@ -120,6 +120,18 @@ def require_label(place: Place, label: str) -> None:
             f"{place.url} holds {standing.label}, not {label}; choose another place, nothing is "
             "written over"
         )
+
+
+def begin(place: Place, label: str) -> None:
+    """Before work whose files are to be published as `label`: refuse a place that will not do.
+
+    Raises
+    ------
+    StorageError
+        Something else was published there, or it cannot be written.
+    """
+    _require_label(place, label)
+    place.write(f"parts/{label}/begun", b"")
 
 
 def read_contents(place: Place) -> Listing:

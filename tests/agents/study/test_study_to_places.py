@@ -148,6 +148,14 @@ def test_what_cannot_be_published_is_refused_before_anything_runs(files, url, mo
     with pytest.raises(StorageError, match="holds bank-1, not trainings"):
         train_seeds(job.config, [0], url)
 
+    CutOffFileSystem.reset(empty=True)
+    monkeypatch.setattr(seeds, "run_tasks", lambda *_, **__: pytest.fail("run"))
+    monkeypatch.setattr(CutOffFileSystem, "pipe_file", lambda *_, **__: 1 // 0)
+    with pytest.raises(StorageError, match="cannot write cutoff://denied"):
+        job_runs.run_jobs([job], files / "copy", url="cutoff://denied")
+    with pytest.raises(StorageError, match="cannot write cutoff://denied"):
+        train_seeds(job.config, [0], "cutoff://denied")
+
 
 def test_results_of_another_configuration_are_refused_and_kept(files, url):
     references = [job for job in studied(files) if job.name == "short/references-0"]

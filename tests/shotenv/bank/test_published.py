@@ -11,6 +11,7 @@ import pytest
 import torch
 from cut_off_places import CutOffFileSystem
 
+from shotenv.bank import published
 from shotenv.bank.clip_jobs import ClipJob, clip_jobs
 from shotenv.bank.files import (
     BankError,
@@ -24,6 +25,7 @@ from shotenv.bank.files import (
 from shotenv.bank.files.layout import ARRAYS
 from shotenv.bank.opening import find_thinned, open_bank
 from shotenv.bank.published import (
+    build_published,
     finish_published,
     publish_bank,
     publish_clip,
@@ -176,6 +178,21 @@ def test_what_is_missing_or_another_bank_is_named(config, url, tmp_path):
     assert standing_clips(url, other) == frozenset()
     with pytest.raises(StorageError, match=f"holds {bank_folder(config).name}, not small-"):
         render_to(url, other, tmp_path / "other")
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_anything_is_rendered(
+    config, monkeypatch, full
+):
+    def denied(*_, **__):
+        raise PermissionError("Access Denied")
+
+    CutOffFileSystem.reset(empty=True)
+    monkeypatch.setattr(CutOffFileSystem, "pipe_file", denied)
+    monkeypatch.setattr(published, "render_clips", lambda *_: pytest.fail("rendered"))
+    monkeypatch.setattr(published, "publish_part", lambda *_, **__: pytest.fail("published"))
+    for work in (build_published, publish_bank):
+        with pytest.raises(StorageError, match=r"cannot write cutoff://denied/x.*Access Denied"):
+            work(config if work is build_published else full, "cutoff://denied/x")
 
 
 def test_a_damaged_record_of_a_clip_is_named(config, url, tmp_path):
