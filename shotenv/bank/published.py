@@ -45,10 +45,13 @@ from unwrap.storage import (
     publish_contents,
     publish_part,
     read_contents,
+    require_storable,
     standing_parts,
 )
-from unwrap.support import progress, say, write_json
+from unwrap.support import in_one_line, progress, say, write_json
 
+LARGEST_RECORD = 2**24
+"""Bytes; that of a clip of 4096 frames has some 350 kB."""
 TABLES = (MANIFEST, THINNED_CONTENTS, RECORDED_CONTENTS)
 
 
@@ -140,21 +143,32 @@ def _clip_records(place: Place, parts: dict[str, Listing]) -> list[ClipRecord]:
     """The clips' own records, in the order of `parts`."""
     files = {}
     for name, listing in parts.items():
-        files[name] = next(f for f in listing.files if f.path == f"{CLIPS}/{name}/{CLIP_RECORD}")
-    found = place.read_all({file.object_name for file in files.values()})
+        where = f"{CLIPS}/{name}"
+        own = {file.path: file for file in listing.files}
+        record = own.get(f"{where}/{CLIP_RECORD}")
+        if record is None or any(Path(path).parent != Path(where) for path in own):
+            raise BankError(
+                f"{place.url}/parts/{listing.label}/{name}.json lists what is no clip; delete it "
+                "and run `shotenv render --to` again"
+            )
+        files[name] = record
+    # Lengths were compared: what is larger than any record is not fetched.
+    found = place.read_all({f.object_name for f in files.values() if f.bytes < LARGEST_RECORD})
     records = []
     for name, file in files.items():
-        content = found[file.object_name]
+        content = found.get(file.object_name, b"")
         try:
             if hashlib.sha256(content).hexdigest() != file.sha256:
                 raise ValueError("not as it was written")
             fields = json.loads(content)
+            if not isinstance(fields, dict):
+                raise ValueError("not a table")
             fields.pop("shape", None)
             records.append(ClipRecord.model_validate(fields))
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise BankError(
                 f"{place.url}/{file.object_name}, the record of clip {name}, is damaged "
-                f"({error}); delete it and run `shotenv render --to` again"
+                f"({in_one_line(error)}); delete it and run `shotenv render --to` again"
             ) from None
     return records
 
@@ -164,14 +178,20 @@ def publish_bank(bank: Bank, url: str) -> Listing:
 
     Raises
     ------
+    BankError
+        It has links that lead out of its folder.
+    ValueError
+        Its name cannot be part of a path.
     unwrap.storage.StorageError
-        The place holds another bank, or cannot be written.
+        The place holds another bank, or cannot be written; or something is no regular file.
     """
     place, folder = Place(url), bank.folder
     if isinstance(bank.manifest, Manifest) and bank.config is not None:
         label = bank_folder(bank.config).name  # As `publish_clip` has it.
     else:
         label = f"{bank.name}-{bank.fingerprint[:8]}"
+    require_storable(label)
+    _require_within(folder)
     begin(place, label)
     clips = [
         clip.folder for clip in bank.manifest.clips if isinstance(clip, ClipRecord | RecordedClip)
@@ -185,6 +205,16 @@ def publish_bank(bank: Bank, url: str) -> Listing:
     rest = sorted(path.name for path in folder.iterdir() if _belongs(path))
     # What makes a folder a bank comes last.
     return publish_contents(place, label, parts, folder, sorted(rest, key=TABLES.__contains__))
+
+
+def _require_within(folder: Path) -> None:
+    """Refuse links out of a bank: who made it may mean files that are nobody's business."""
+    for path in folder.rglob("*"):
+        if path.is_symlink() and not path.resolve().is_relative_to(folder):
+            raise BankError(
+                f"{path} leads to {path.resolve()}, out of the bank; put a copy of it there to "
+                "publish it"
+            )
 
 
 def _belongs(path: Path) -> bool:

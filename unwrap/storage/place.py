@@ -158,7 +158,8 @@ class Place:
             raise
         # Each backend has errors of its own, which share no class.
         except Exception as error:
-            reason = in_one_line(error) or type(error).__name__
+            missing = isinstance(error, FileNotFoundError)
+            reason = "no such file or bucket" if missing else in_one_line(error)
             raise StorageError(f"cannot {verb} {self._shown(name)}: {reason}") from None
 
 

@@ -32,17 +32,17 @@ def publish_part(
         Name of the part.
     names : sequence of str, optional
         Paths of the files in `folder`, in the order in which they are to be fetched; by default
-        all that lie directly in it.
+        all that lie directly in it, but for hidden ones.
     under : str
         Folder of the files in what is published.
 
     Raises
     ------
     StorageError
-        The place cannot be written.
+        The place cannot be written, or what is to be published is no regular file.
     """
     if names is None:
-        names = sorted(path.name for path in folder.iterdir())
+        names = sorted(p.name for p in folder.iterdir() if not p.name.startswith("."))
     listing = Listing(label=label, files=stored_files(folder, names, under=under))
     for name, file in zip(names, listing.files, strict=True):
         _upload(place, file, folder / name)

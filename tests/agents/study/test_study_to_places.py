@@ -197,6 +197,13 @@ def test_a_training_is_kept_and_resumed(tmp_path, url, monkeypatch):
     damaged = r"unfinished/study/a/b-0.*zip is damaged.*delete it"
     with pytest.raises(StorageError, match=damaged), shelf.resumed("a/b-0", told, other):
         pass
+    locked = whole.replace(b"PK\3\4\x14\0\0", b"PK\3\4\x14\0\1").replace(
+        b"PK\1\2\x14\3\x14\0\0", b"PK\1\2\x14\3\x14\0\1"
+    )
+    place.write(there, locked)
+    said = r"encrypted.*delete it"
+    with pytest.raises(StorageError, match=said), shelf.resumed("a/b-0", told, other):
+        pass
     place.write(there, whole[:-30])
     with pytest.raises(StorageError, match="is damaged"), shelf.resumed("a/b-0", told, other):
         pass
