@@ -28,9 +28,11 @@ from shotenv.bank.files import (
     ClipRecord,
     Manifest,
     RecordedClip,
+    TableOfContents,
     bank_folder,
     fetched_banks,
     identity,
+    read_table,
     write_manifest,
 )
 from shotenv.config import BankConfig
@@ -234,10 +236,8 @@ def fetch_bank(url: str) -> Path:
         Nothing is there, the place cannot be read, a file is damaged, or the disk is full.
     """
     place = Place(url)
-    contents = read_contents(place)
+    contents = _contents_of_bank(place)
     table = contents.files[-1].path
-    if table not in TABLES:
-        raise BankError(f"{place.url} holds {contents.label}, which is no bank")
     folder = fetched_banks() / f"{contents.label}-{contents.digest[:16]}"
     # Without the lock, which a folder that can only be read would not give.
     if (folder / table).is_file():
@@ -246,6 +246,29 @@ def fetch_bank(url: str) -> Path:
     with FileLock(folder / ".lock"), _bytes_bar(contents, f"fetching {contents.label}") as bar:
         fetch(place, contents, folder, tick=bar.update)
     return folder
+
+
+def _contents_of_bank(place: Place) -> Listing:
+    contents = read_contents(place)
+    if contents.files[-1].path not in TABLES:
+        raise BankError(f"{place.url} holds {contents.label}, which is no bank")
+    return contents
+
+
+def published_table(url: str) -> tuple[TableOfContents, int]:
+    """Table of contents of the bank at `url` and its bytes, without fetching its arrays.
+
+    Raises
+    ------
+    BankError, unwrap.storage.StorageError
+        As of `fetch_bank`.
+    """
+    place = Place(url)
+    contents = _contents_of_bank(place)
+    table = contents.files[-1]
+    with tempfile.TemporaryDirectory() as folder:
+        fetch(place, contents.model_copy(update={"files": (table,)}), Path(folder))
+        return read_table(Path(folder) / table.path), contents.total_bytes
 
 
 def verify_published(url: str) -> tuple[StoredFile, ...]:

@@ -26,6 +26,7 @@ from shotenv.bank.files import (
     write_manifest,
 )
 from shotenv.bank.files.layout import ARRAYS
+from shotenv.bank.listing.contents import contents_at, contents_of as told_of
 from shotenv.bank.opening import find_thinned, open_bank
 from shotenv.bank.published import (
     build_published,
@@ -118,6 +119,20 @@ def test_a_bank_rendered_to_a_place_is_byte_for_byte_that_of_a_folder(config, ur
     assert bank.folder.is_relative_to(fetched_banks()) and verify(bank.folder) == ()
     assert verify_published(url) == ()
     assert torch.equal(bank.distance_m(torch.tensor([5])), bank.frame(5).exposure.distance_m)
+
+
+def test_what_is_in_a_bank_is_told_without_its_arrays(config, url, full, thinned, tmp_path):
+    render_to(url, config, tmp_path / "scratch")
+    published = [(open_bank(folder_of(config, tmp_path / "here")), url)]
+    for number, bank in enumerate((full, thinned)):
+        publish_bank(bank, f"{url}/{number}")
+        published.append((bank, f"{url}/{number}"))
+    for bank, where in published:
+        here, there = told_of(bank), contents_at(where)
+        assert there.pop("folder") == where and there.pop("bytes") > 0.9 * here.pop("bytes")
+        del here["folder"]
+        assert there == here
+    assert not fetched_banks().exists()
 
 
 def test_an_opened_bank_is_fetched_once(config, tmp_path):
