@@ -4,7 +4,12 @@ from .listing import (
     StoredFile as StoredFile,
     require_storable as require_storable,
 )
-from .place import Place as Place, StorageError as StorageError, is_url as is_url
+from .place import (
+    Place as Place,
+    StorageError as StorageError,
+    is_url as is_url,
+    require_plain as require_plain,
+)
 from .publishing import (
     begin as begin,
     find_part as find_part,

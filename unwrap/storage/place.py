@@ -57,7 +57,7 @@ class Place:
     """
 
     def __init__(self, url: str) -> None:
-        _require_plain(url)
+        require_plain(url)
         self.url = url.rstrip("/")
         self._files, root = _opened(self.url)
         self._root = root.rstrip("/")
@@ -163,10 +163,15 @@ class Place:
             raise StorageError(f"cannot {verb} {self._shown(name)}: {reason}") from None
 
 
-def _require_plain(url: str) -> None:
+def require_plain(url: str) -> None:
     """Refuse URLs that would tell a password to whoever reads a message or a result.
 
     Nor chained ones (`reference::https://...`): what lies at one would name what else is read.
+
+    Raises
+    ------
+    StorageError
+        Tells the protocol alone.
     """
     if PASSWORD.search(url):
         raise StorageError(

@@ -251,6 +251,22 @@ def test_one_training_wants_a_folder(tmp_path, capsys):
     assert f"out is file://{tmp_path}/x, a place: expected with --seeds" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        *(["train", "--out"], ["train", "--seeds", "0", "--out"], ["study", "none.yaml", "--out"]),
+        *(["demo", "--env.bank"], ["bank", "info"], ["bank", "verify"], ["fetch", "--out", "x"]),
+        ["render", "--to"],
+    ],
+)
+def test_a_password_in_a_url_is_told_by_no_command(words, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main([*words, "s3://key:secret@shelf/x"]) in (1, 2)
+    told = capsys.readouterr()
+    assert "secret" not in told.out + told.err and "has a password" in told.err
+    assert list(tmp_path.iterdir()) == []
+
+
 def played(files) -> list[Job]:
     """Chance, a scheduler, and the scheduler played elsewhere."""
     by_name = {job.name: job for job in studied(files)}
