@@ -1,6 +1,6 @@
 """Write `docs/licences.md`: the licence of every package that is installed, and who brings it.
 
-With everything installed, that of the extra `docs`, too: `python docs/licences_table.py`
+With everything installed, that of the extras `docs` and `s3`, too: `python docs/licences_table.py`
 """
 
 from __future__ import annotations

@@ -65,7 +65,7 @@ def render_bank(arguments: Namespace) -> int:
 
 def info_arguments(parser: ArgumentParser) -> None:
     """Which bank, and the contact sheet that is wanted of it."""
-    parser.add_argument("bank", nargs="?", help="name or path of a bank; all that are known")
+    parser.add_argument("bank", nargs="?", help="name, path or URL of a bank; all that are known")
     parser.add_argument("--sheet", type=Path, metavar="FILE", help="write a contact sheet (PNG)")
     parser.add_argument("--clips", type=PositiveInt, default=3, help="on the sheet, per family")
     add_json(parser)
@@ -76,20 +76,25 @@ def tell_about_banks(arguments: Namespace) -> int:
     from shotenv.bank import open_bank
     from shotenv.bank.listing import (
         contact_sheet,
+        contents_at,
         contents_of,
         known_banks,
         print_banks,
         print_contents,
     )
+    from unwrap.storage import is_url
 
     if arguments.bank is None:
         banks = known_banks()
         print_banks(banks)
         write_numbers(arguments, banks)
         return DONE
-    # Whoever asks what a bank holds does not want to wait an hour for it to be rendered.
-    bank = open_bank(arguments.bank, render=False)
-    about = contents_of(bank)
+    if is_url(arguments.bank) and arguments.sheet is None:
+        about = contents_at(arguments.bank)
+    else:
+        # Whoever asks what a bank holds does not want to wait an hour for it to be rendered.
+        bank = open_bank(arguments.bank, render=False)
+        about = contents_of(bank)
     print_contents(about)
     if arguments.sheet is not None:
         content = io.BytesIO()

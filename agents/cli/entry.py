@@ -19,6 +19,7 @@ from agents.cli import (
     collect_command,
     doctor,
     export_command,
+    fetch_command,
     play_command,
     problem_command,
     schedule_commands,
@@ -26,7 +27,7 @@ from agents.cli import (
 )
 from agents.cli.cameras import CALIBRATE, CORRECT, DESCRIBE, RECORD
 from agents.cli.command import DONE, FAILED, INTERRUPTED, WRONG_USAGE, Command, check_outputs
-from shotenv.config import ConfigError, one_sentence
+from shotenv.config import ConfigError, imports_refused, one_sentence
 
 OWN_PACKAGES = ("agents", "shotenv", "unwrap")
 USUAL_FORMAT = warnings.formatwarning
@@ -39,6 +40,7 @@ COMMANDS: tuple[Command, ...] = (
     *collect_command.COMMANDS,
     *export_command.COMMANDS,
     *bank_commands.COMMANDS,
+    *fetch_command.COMMANDS,
     *unwrap_commands.COMMANDS,
     CORRECT,
     DESCRIBE,
@@ -124,7 +126,8 @@ def _parsed(command: Command, words: list[str]) -> Namespace:
     """
     parser = command.parser()
     try:
-        arguments = parser.instantiate(parser.parse_args(words))
+        with imports_refused():
+            arguments = parser.instantiate(parser.parse_args(words))
     except (ArgumentError, ValueError, TypeError) as error:
         raise ConfigError(_plain(one_sentence(error))) from None
     # Before minutes are spent on what could not be written then.

@@ -10,7 +10,7 @@ from typing import Any, Final
 from agents.study.jobs import Job
 from agents.study.published_work import Shelf
 from agents.training import CHECKPOINT
-from unwrap.storage import Place, publish_contents, require_label, require_storable, standing_parts
+from unwrap.storage import Place, begin, publish_contents, require_storable, standing_parts
 from unwrap.support import progress
 
 STUDY: Final = "study"
@@ -25,12 +25,12 @@ def fetch_results(url: str, jobs: Sequence[Job], folder: Path) -> None:
     ValueError
         A job has a name that cannot be published.
     unwrap.storage.StorageError
-        The place holds no study, cannot be read, or a result is damaged.
+        The place holds no study, cannot be read or written, or a result is damaged.
     """
     for job in jobs:
         require_storable(job.name)
     place = Place(url)
-    require_label(place, STUDY)
+    begin(place, STUDY)
     standing = standing_parts(place, STUDY)
     done = [job for job in jobs if job.name in standing]
     with progress(len(done), "fetching results", "job") as bar:

@@ -11,6 +11,7 @@ import json
 import tempfile
 import threading
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -118,7 +119,7 @@ class Shelf(NamedTuple):
             with zipfile.ZipFile(archive) as packed:
                 _check_members(packed)
                 packed.extractall(folder)
-        except (zipfile.BadZipFile, ValueError, EOFError) as error:
+        except (zipfile.BadZipFile, zlib.error, ValueError, RuntimeError, EOFError) as error:
             raise StorageError(
                 f"{place.url}/{there} is damaged ({error}); delete it to train anew"
             ) from None

@@ -11,7 +11,7 @@ from agents.config import DemoConfig
 from agents.study.published_work import Shelf
 from agents.training import train_scheduler
 from unwrap.execution import Executor, output_to, run_tasks, visible
-from unwrap.storage import Place, publish_contents, require_label, standing_parts
+from unwrap.storage import Place, begin, publish_contents, standing_parts
 from unwrap.support import progress
 
 TRAININGS: Final = "trainings"
@@ -60,7 +60,7 @@ def train_seeds(
     if url is None:
         folder.mkdir(parents=True, exist_ok=True)
     else:
-        require_label(Place(url), TRAININGS)
+        begin(Place(url), TRAININGS)
     tasks = [
         SeedTask(
             config.model_copy(update={"agent": config.agent.model_copy(update={"seed": seed})}),

@@ -22,6 +22,7 @@ from .files import (
     RecordedContents as RecordedContents,
     StoredNetwork as StoredNetwork,
     TableOfContents as TableOfContents,
+    ThinnedContents as ThinnedContents,
     TruthLevel as TruthLevel,
     bank_folder as bank_folder,
     cache_dir as cache_dir,
@@ -44,6 +45,7 @@ from .published import (
     finish_published as finish_published,
     publish_bank as publish_bank,
     publish_clip as publish_clip,
+    published_table as published_table,
     standing_clips as standing_clips,
     verify_published as verify_published,
 )

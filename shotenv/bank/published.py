@@ -28,9 +28,11 @@ from shotenv.bank.files import (
     ClipRecord,
     Manifest,
     RecordedClip,
+    TableOfContents,
     bank_folder,
     fetched_banks,
     identity,
+    read_table,
     write_manifest,
 )
 from shotenv.config import BankConfig
@@ -39,16 +41,19 @@ from unwrap.storage import (
     Listing,
     Place,
     StoredFile,
+    begin,
     damaged_files,
     fetch,
     publish_contents,
     publish_part,
     read_contents,
-    require_label,
+    require_storable,
     standing_parts,
 )
-from unwrap.support import progress, say, write_json
+from unwrap.support import in_one_line, progress, say, write_json
 
+LARGEST_RECORD = 2**24
+"""Bytes; that of a clip of 4096 frames has some 350 kB."""
 TABLES = (MANIFEST, THINNED_CONTENTS, RECORDED_CONTENTS)
 
 
@@ -72,7 +77,7 @@ def build_published(
         As of `build_bank`.
     """
     place = Place(url)
-    require_label(place, bank_folder(config).name)
+    begin(place, bank_folder(config).name)
     standing = standing_clips(url, config)
     jobs = clip_jobs(config, Path())
     missing = [replace(job, url=url) for job in jobs if job.name not in standing]
@@ -140,21 +145,32 @@ def _clip_records(place: Place, parts: dict[str, Listing]) -> list[ClipRecord]:
     """The clips' own records, in the order of `parts`."""
     files = {}
     for name, listing in parts.items():
-        files[name] = next(f for f in listing.files if f.path == f"{CLIPS}/{name}/{CLIP_RECORD}")
-    found = place.read_all({file.object_name for file in files.values()})
+        where = f"{CLIPS}/{name}"
+        own = {file.path: file for file in listing.files}
+        record = own.get(f"{where}/{CLIP_RECORD}")
+        if record is None or any(Path(path).parent != Path(where) for path in own):
+            raise BankError(
+                f"{place.url}/parts/{listing.label}/{name}.json lists what is no clip; delete it "
+                "and run `shotenv render --to` again"
+            )
+        files[name] = record
+    # Lengths were compared: what is larger than any record is not fetched.
+    found = place.read_all({f.object_name for f in files.values() if f.bytes < LARGEST_RECORD})
     records = []
     for name, file in files.items():
-        content = found[file.object_name]
+        content = found.get(file.object_name, b"")
         try:
             if hashlib.sha256(content).hexdigest() != file.sha256:
                 raise ValueError("not as it was written")
             fields = json.loads(content)
+            if not isinstance(fields, dict):
+                raise ValueError("not a table")
             fields.pop("shape", None)
             records.append(ClipRecord.model_validate(fields))
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise BankError(
                 f"{place.url}/{file.object_name}, the record of clip {name}, is damaged "
-                f"({error}); delete it and run `shotenv render --to` again"
+                f"({in_one_line(error)}); delete it and run `shotenv render --to` again"
             ) from None
     return records
 
@@ -164,15 +180,21 @@ def publish_bank(bank: Bank, url: str) -> Listing:
 
     Raises
     ------
+    BankError
+        It has links that lead out of its folder.
+    ValueError
+        Its name cannot be part of a path.
     unwrap.storage.StorageError
-        The place holds another bank, or cannot be written.
+        The place holds another bank, or cannot be written; or something is no regular file.
     """
     place, folder = Place(url), bank.folder
     if isinstance(bank.manifest, Manifest) and bank.config is not None:
         label = bank_folder(bank.config).name  # As `publish_clip` has it.
     else:
         label = f"{bank.name}-{bank.fingerprint[:8]}"
-    require_label(place, label)
+    require_storable(label)
+    _require_within(folder)
+    begin(place, label)
     clips = [
         clip.folder for clip in bank.manifest.clips if isinstance(clip, ClipRecord | RecordedClip)
     ]
@@ -185,6 +207,16 @@ def publish_bank(bank: Bank, url: str) -> Listing:
     rest = sorted(path.name for path in folder.iterdir() if _belongs(path))
     # What makes a folder a bank comes last.
     return publish_contents(place, label, parts, folder, sorted(rest, key=TABLES.__contains__))
+
+
+def _require_within(folder: Path) -> None:
+    """Refuse links out of a bank: who made it may mean files that are nobody's business."""
+    for path in folder.rglob("*"):
+        if path.is_symlink() and not path.resolve().is_relative_to(folder):
+            raise BankError(
+                f"{path} leads to {path.resolve()}, out of the bank; put a copy of it there to "
+                "publish it"
+            )
 
 
 def _belongs(path: Path) -> bool:
@@ -204,10 +236,8 @@ def fetch_bank(url: str) -> Path:
         Nothing is there, the place cannot be read, a file is damaged, or the disk is full.
     """
     place = Place(url)
-    contents = read_contents(place)
+    contents = _contents_of_bank(place)
     table = contents.files[-1].path
-    if table not in TABLES:
-        raise BankError(f"{place.url} holds {contents.label}, which is no bank")
     folder = fetched_banks() / f"{contents.label}-{contents.digest[:16]}"
     # Without the lock, which a folder that can only be read would not give.
     if (folder / table).is_file():
@@ -216,6 +246,29 @@ def fetch_bank(url: str) -> Path:
     with FileLock(folder / ".lock"), _bytes_bar(contents, f"fetching {contents.label}") as bar:
         fetch(place, contents, folder, tick=bar.update)
     return folder
+
+
+def _contents_of_bank(place: Place) -> Listing:
+    contents = read_contents(place)
+    if contents.files[-1].path not in TABLES:
+        raise BankError(f"{place.url} holds {contents.label}, which is no bank")
+    return contents
+
+
+def published_table(url: str) -> tuple[TableOfContents, int]:
+    """Table of contents of the bank at `url` and its bytes, without fetching its arrays.
+
+    Raises
+    ------
+    BankError, unwrap.storage.StorageError
+        As of `fetch_bank`.
+    """
+    place = Place(url)
+    contents = _contents_of_bank(place)
+    table = contents.files[-1]
+    with tempfile.TemporaryDirectory() as folder:
+        fetch(place, contents.model_copy(update={"files": (table,)}), Path(folder))
+        return read_table(Path(folder) / table.path), contents.total_bytes
 
 
 def verify_published(url: str) -> tuple[StoredFile, ...]:

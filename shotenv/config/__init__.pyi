@@ -13,6 +13,7 @@ from .families import (
     Family as Family,
     Split as Split,
 )
+from .imported_names import imports_refused as imports_refused
 from .keywords import env_config as env_config
 from .laser import ROOM_K as ROOM_K, LaserConfig as LaserConfig
 from .mounts import MountConfig as MountConfig

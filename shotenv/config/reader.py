@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import jsonargparse
 from pydantic import ValidationError
 
+from shotenv.config.imported_names import imports_refused
 from shotenv.config.yaml_limits import MOST_YAML_BYTES, limit_yaml
 from unwrap.support import Section, require_regular
 
@@ -66,7 +67,8 @@ def read_config(model: type[Model], path: Path, overrides: Sequence[str] = ()) -
     words = [f"--config.{word[2:]}" if word.startswith("--") else word for word in overrides]
     try:
         require_regular(path, MOST_YAML_BYTES)
-        return parser.instantiate(parser.parse_args(["--config", str(path), *words])).config
+        with imports_refused():
+            return parser.instantiate(parser.parse_args(["--config", str(path), *words])).config
     except (jsonargparse.ArgumentError, ValueError, TypeError, OSError) as error:
         sentence = one_sentence(error)
         if (unknown := UNKNOWN_KEY.search(sentence)) is not None:

@@ -4,12 +4,17 @@ from .listing import (
     StoredFile as StoredFile,
     require_storable as require_storable,
 )
-from .place import Place as Place, StorageError as StorageError, is_url as is_url
+from .place import (
+    Place as Place,
+    StorageError as StorageError,
+    is_url as is_url,
+    require_plain as require_plain,
+)
 from .publishing import (
+    begin as begin,
     find_part as find_part,
     publish_contents as publish_contents,
     publish_part as publish_part,
     read_contents as read_contents,
-    require_label as require_label,
     standing_parts as standing_parts,
 )

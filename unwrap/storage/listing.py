@@ -11,7 +11,8 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from unwrap.support import in_one_line
+from unwrap.storage.place import StorageError
+from unwrap.support import in_one_line, open_regular
 
 LARGEST_JSON_BYTES = 64 * 2**20
 WORD = r"[A-Za-z0-9_-][A-Za-z0-9_.-]*"
@@ -111,12 +112,22 @@ def require_storable(path: str) -> None:
 
 
 def stored_files(folder: Path, names: Iterable[str], *, under: str = "") -> tuple[StoredFile, ...]:
-    """The files `names` of a local folder; their paths begin with `under`."""
+    """The files `names` of a local folder; their paths begin with `under`.
+
+    Raises
+    ------
+    StorageError
+        One is no regular file, or has a name that no listing may have.
+    """
     prefix = f"{under}/" if under else ""
     found = []
     for name in names:
-        with (folder / name).open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
-            size = file.tell()
+        try:
+            require_storable(name)
+            with open_regular(folder / name) as file:
+                digest = hashlib.file_digest(file, "sha256").hexdigest()
+                size = file.tell()
+        except ValueError as error:
+            raise StorageError(f"{folder / name} cannot be published: {error}") from None
         found.append(StoredFile(path=f"{prefix}{name}", sha256=digest, bytes=size))
     return tuple(found)

@@ -11,6 +11,8 @@ from typing import Any
 from unwrap.support import in_one_line, replacing
 
 URL = re.compile(r"[A-Za-z][A-Za-z0-9+.:-]*://")
+PASSWORD = re.compile(r"://[^/]*:.*@|://[^/].*[?]")
+"""A URL with what may be one, also where it has a slash; or in what is asked of a server."""
 PIECE_BYTES = 2**24
 """A large file is read in pieces of so many."""
 
@@ -36,13 +38,15 @@ class Place:
     Parameters
     ----------
     url
-        With any protocol that fsspec knows: `file:///shared/bank`, `s3://bucket/bank`. Keys and
-        passwords are taken from where the backend of that protocol looks for them.
+        Of a bucket or a folder, by any such protocol that fsspec knows: `s3://bucket/bank`,
+        `file:///shared/bank`. Keys and passwords are taken from where the backend of that protocol
+        looks for them.
 
     Raises
     ------
     StorageError
-        fsspec or the backend is not installed, or there is no such protocol.
+        fsspec or the backend is not installed, there is no such protocol, or the URL has a password
+        in it or is made of several.
 
     Examples
     --------
@@ -53,9 +57,9 @@ class Place:
     """
 
     def __init__(self, url: str) -> None:
-        # Without what stands before an @, which may be a password.
-        self.url = re.sub(r"//[^/@]*@", "//", url.rstrip("/"))
-        self._files, root = _opened(url, self.url)
+        require_plain(url)
+        self.url = url.rstrip("/")
+        self._files, root = _opened(self.url)
         self._root = root.rstrip("/")
         self._is_local = "file" in _protocols(self._files)
 
@@ -118,15 +122,12 @@ class Place:
         """Put a small file there, over one of that name."""
         path = self._path(name)
         with self._telling("write", name):
-            if self._is_local:
-                with replacing(Path(path)) as file:
-                    file.write(content)
+            if not self._is_local:
+                # No folders are made: fsspec would make a bucket, too, of a name that is misspelt.
+                self._files.pipe_file(path, content)
                 return
-            try:
-                self._files.pipe_file(path, content)
-            except FileNotFoundError:  # Where folders have to be made.
-                self._files.makedirs(path.rpartition("/")[0], exist_ok=True)
-                self._files.pipe_file(path, content)
+            with replacing(Path(path)) as file:
+                file.write(content)
 
     def upload(self, name: str, source: Path) -> None:
         """Put a copy of a local file there, over one of that name."""
@@ -157,27 +158,49 @@ class Place:
             raise
         # Each backend has errors of its own, which share no class.
         except Exception as error:
-            reason = in_one_line(error) or type(error).__name__
+            missing = isinstance(error, FileNotFoundError)
+            reason = "no such file or bucket" if missing else in_one_line(error)
             raise StorageError(f"cannot {verb} {self._shown(name)}: {reason}") from None
 
 
-def _opened(url: str, shown: str) -> tuple[Any, str]:
+def require_plain(url: str) -> None:
+    """Refuse URLs that would tell a password to whoever reads a message or a result.
+
+    Nor chained ones (`reference::https://...`): what lies at one would name what else is read.
+
+    Raises
+    ------
+    StorageError
+        Tells the protocol alone.
+    """
+    if PASSWORD.search(url):
+        raise StorageError(
+            f"the URL of a place at {url.partition(':')[0]}:// has a password or a question in it; "
+            "expected neither: keys are taken from where the package for it looks for them, such "
+            "as the environment"
+        )
+    if "::" in url:
+        raise StorageError(f"{url} is no place: made of several; expected one URL")
+
+
+def _opened(url: str) -> tuple[Any, str]:
     """fsspec's file system and the path in it."""
     try:
         from fsspec.core import url_to_fs
     except ImportError:
         raise StorageError(
-            f"{shown} needs the package fsspec; `pip install 'shotenv[scale]'` brings it"
+            f"{url} needs the package fsspec; `pip install 'shotenv[scale]'` brings it"
         ) from None
     try:
         # Without its memory of listings: others write there as well.
         return url_to_fs(url, use_listings_cache=False)
     except ImportError as error:
         raise StorageError(
-            f"{shown} needs a package that is not installed: {in_one_line(error)}"
+            f"{url} needs a package that is not installed: {in_one_line(error)}"
         ) from None
-    except ValueError as error:
-        raise StorageError(f"{shown} is no place: {in_one_line(error)}") from None
+    # No such protocol; or what backends raise that connect at once, each its own errors.
+    except Exception as error:
+        raise StorageError(f"{url} is no place: {in_one_line(error)}") from None
 
 
 def _protocols(files: Any) -> tuple[str, ...]:

@@ -32,17 +32,17 @@ def publish_part(
         Name of the part.
     names : sequence of str, optional
         Paths of the files in `folder`, in the order in which they are to be fetched; by default
-        all that lie directly in it.
+        all that lie directly in it, but for hidden ones.
     under : str
         Folder of the files in what is published.
 
     Raises
     ------
     StorageError
-        The place cannot be written.
+        The place cannot be written, or what is to be published is no regular file.
     """
     if names is None:
-        names = sorted(path.name for path in folder.iterdir())
+        names = sorted(p.name for p in folder.iterdir() if not p.name.startswith("."))
     listing = Listing(label=label, files=stored_files(folder, names, under=under))
     for name, file in zip(names, listing.files, strict=True):
         _upload(place, file, folder / name)
@@ -97,7 +97,7 @@ def publish_contents(
     StorageError
         The place holds something else, or cannot be written.
     """
-    require_label(place, label)
+    _require_label(place, label)
     rest = stored_files(folder, names)
     for name, file in zip(names, rest, strict=True):
         _upload(place, file, folder / name)
@@ -106,7 +106,7 @@ def publish_contents(
     return listing
 
 
-def require_label(place: Place, label: str) -> None:
+def _require_label(place: Place, label: str) -> None:
     """Refuse a place where something else was published.
 
     Raises
@@ -120,6 +120,18 @@ def require_label(place: Place, label: str) -> None:
             f"{place.url} holds {standing.label}, not {label}; choose another place, nothing is "
             "written over"
         )
+
+
+def begin(place: Place, label: str) -> None:
+    """Before work whose files are to be published as `label`: refuse a place that will not do.
+
+    Raises
+    ------
+    StorageError
+        Something else was published there, or it cannot be written.
+    """
+    _require_label(place, label)
+    place.write(f"parts/{label}/begun", b"")
 
 
 def read_contents(place: Place) -> Listing:

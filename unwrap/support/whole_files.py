@@ -33,7 +33,6 @@ def open_regular(path: Path, most_bytes: int = sys.maxsize) -> BufferedReader:
     """
     # Without waiting: a pipe opens at once, and is then told by what it is.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-    file = os.fdopen(handle, "rb")
     try:
         found = os.fstat(handle)
         if not stat.S_ISREG(found.st_mode):
@@ -41,9 +40,9 @@ def open_regular(path: Path, most_bytes: int = sys.maxsize) -> BufferedReader:
         if found.st_size > most_bytes:
             raise ValueError(f"{found.st_size} bytes; expected at most {most_bytes}")
     except BaseException:
-        file.close()
+        os.close(handle)
         raise
-    return file
+    return os.fdopen(handle, "rb")
 
 
 def require_regular(path: Path, most_bytes: int) -> None:

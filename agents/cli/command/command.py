@@ -103,10 +103,12 @@ def add_out_or_url(parser: ArgumentParser, default: str, what: str) -> None:
 
 
 def _path_or_url(text: str) -> Path | str:
-    from unwrap.storage import is_url
+    from unwrap.storage import is_url, require_plain
 
-    # A path would make one slash of the two.
-    return text if is_url(text) else Path(text)
+    if not is_url(text):
+        return Path(text)
+    require_plain(text)
+    return text  # A path would make one slash of the two.
 
 
 def add_sensor_and_merge(parser: ArgumentParser) -> None:

@@ -7,6 +7,7 @@ from jsonargparse import ArgumentParser, Namespace
 from agents.cli.command.command import add_config, add_json
 from agents.config import DemoConfig
 from shotenv.config import EnvConfig
+from unwrap.storage import is_url, require_plain
 
 
 def add_experiment(parser: ArgumentParser) -> None:
@@ -16,7 +17,9 @@ def add_experiment(parser: ArgumentParser) -> None:
 
 
 def experiment_of(arguments: Namespace) -> DemoConfig:
-    """The configuration that `add_experiment` asked for."""
+    """The configuration that `add_experiment` asked for; a bank's URL may have no password."""
+    if is_url(arguments.env.bank):
+        require_plain(arguments.env.bank)  # Before anything tells it.
     return DemoConfig(env=arguments.env, agent=arguments.agent, study=arguments.study)
 
 

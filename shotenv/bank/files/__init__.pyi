@@ -35,6 +35,7 @@ from .store import (
     read_clip_record as read_clip_record,
     read_manifest as read_manifest,
     read_recorded_contents as read_recorded_contents,
+    read_table as read_table,
     read_thinned_contents as read_thinned_contents,
     sha256_of as sha256_of,
     verify as verify,

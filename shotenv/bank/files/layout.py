@@ -125,7 +125,8 @@ class TableOfContents(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     schema_version: Literal[1] = SCHEMA_VERSION
-    name: str
+    # Where it is shown or made part of a path, it stays what it is.
+    name: str = Field(pattern=r"^[^/\\\x00-\x1f\x7f]{1,200}$")
     height: int = Field(ge=1, le=4096)
     width: int = Field(ge=1, le=4096)
     config: BankConfig | None

@@ -264,6 +264,15 @@ def read_recorded_contents(folder: Path) -> RecordedContents:
     return contents
 
 
+def read_table(path: Path) -> TableOfContents:
+    """Table of contents of a bank of any kind, whose arrays need not be there."""
+    if path.name == MANIFEST:
+        return _read_contents(Manifest, path, undigested=True)
+    return _read_contents(
+        ThinnedContents if path.name == THINNED_CONTENTS else RecordedContents, path
+    )
+
+
 def _read_contents(model: type[Contents], path: Path, *, undigested: bool = False) -> Contents:
     content = _load_json(path)
     if undigested and "digest" not in content:

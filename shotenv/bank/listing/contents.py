@@ -10,17 +10,20 @@ from shotenv.bank import (
     SHIPPED,
     THINNED_CONTENTS,
     Bank,
-    RecordedBank,
+    RecordedContents,
     RenderedBank,
-    ThinnedBank,
+    TableOfContents,
+    ThinnedContents,
     bank_bytes,
     bank_folder,
     clips_standing,
     frame_bytes,
+    published_table,
     read_thinned_contents,
     rendering_minutes,
 )
 from shotenv.config import BankConfig, configs_dir, read_config
+from unwrap.signal import Shots
 
 
 def known_banks() -> list[dict[str, Any]]:
@@ -97,23 +100,39 @@ def _state(bank: dict[str, Any]) -> str:
 
 def contents_of(bank: Bank) -> dict[str, Any]:
     """Size, frames of each family in each split, and the configuration of `bank`."""
+    return _contents(bank.manifest, str(bank.folder), _bytes_of(bank))
+
+
+def contents_at(url: str) -> dict[str, Any]:
+    """The same of a bank at a URL, of which the table of contents alone is fetched.
+
+    Raises
+    ------
+    BankError, unwrap.storage.StorageError
+        What is there is no bank, or cannot be read.
+    """
+    about, size = published_table(url)
+    return _contents(about, url, size)
+
+
+def _contents(about: TableOfContents, where: str, size: int) -> dict[str, Any]:
     splits: dict[str, dict[str, int]] = {}
-    for clip in bank.clips:
+    for clip in about.clips:
         families = splits.setdefault(clip.split, {})
         families[clip.family] = families.get(clip.family, 0) + clip.frames
     return {
-        "name": bank.name,
-        "folder": str(bank.folder),
-        "fingerprint": bank.fingerprint,
-        "frames": len(bank),
-        "clips": len(bank.clips),
-        "width": bank.width,
-        "height": bank.height,
-        "bytes": _bytes_of(bank),
-        "thinned": _thinning_of(bank) if isinstance(bank, ThinnedBank) else None,
-        "recorded": _recording_of(bank) if isinstance(bank, RecordedBank) else None,
+        "name": about.name,
+        "folder": where,
+        "fingerprint": about.fingerprint,
+        "frames": sum(clip.frames for clip in about.clips),
+        "clips": len(about.clips),
+        "width": about.width,
+        "height": about.height,
+        "bytes": size,
+        "thinned": _thinning_of(about) if isinstance(about, ThinnedContents) else None,
+        "recorded": _recording_of(about) if isinstance(about, RecordedContents) else None,
         "splits": splits,
-        "config": None if bank.config is None else bank.config.model_dump(mode="json"),
+        "config": None if about.config is None else about.config.model_dump(mode="json"),
     }
 
 
@@ -125,9 +144,8 @@ def _bytes_of(bank: Bank) -> int:
     return len(bank) * frame_bytes(bank.height, bank.width)
 
 
-def _thinning_of(bank: ThinnedBank) -> dict[str, Any]:
+def _thinning_of(about: ThinnedContents) -> dict[str, Any]:
     """What a thinned bank was made from, and the networks whose predictions it holds."""
-    about = bank.manifest
     return {
         "every": about.every,
         "seed": about.seed,
@@ -136,14 +154,13 @@ def _thinning_of(bank: ThinnedBank) -> dict[str, Any]:
     }
 
 
-def _recording_of(bank: RecordedBank) -> dict[str, Any]:
+def _recording_of(about: RecordedContents) -> dict[str, Any]:
     """What recordings are of, what they answer and what they are scored against."""
-    about = bank.manifest
     return {
         "camera": about.camera,
         "sensor": about.sensor.name,
         "frame_rate_hz": about.frame_rate_hz,
-        "answers": [int(shots) for shots in bank.answers],
+        "answers": [int(shots) for shots in Shots if shots <= about.samples],
         "truth": about.truth,
         "made": about.made,
     }

@@ -148,6 +148,14 @@ def test_what_cannot_be_published_is_refused_before_anything_runs(files, url, mo
     with pytest.raises(StorageError, match="holds bank-1, not trainings"):
         train_seeds(job.config, [0], url)
 
+    CutOffFileSystem.reset(empty=True)
+    monkeypatch.setattr(seeds, "run_tasks", lambda *_, **__: pytest.fail("run"))
+    monkeypatch.setattr(CutOffFileSystem, "pipe_file", lambda *_, **__: 1 // 0)
+    with pytest.raises(StorageError, match="cannot write cutoff://denied"):
+        job_runs.run_jobs([job], files / "copy", url="cutoff://denied")
+    with pytest.raises(StorageError, match="cannot write cutoff://denied"):
+        train_seeds(job.config, [0], "cutoff://denied")
+
 
 def test_results_of_another_configuration_are_refused_and_kept(files, url):
     references = [job for job in studied(files) if job.name == "short/references-0"]
@@ -188,6 +196,13 @@ def test_a_training_is_kept_and_resumed(tmp_path, url, monkeypatch):
     place.write(there, whole.replace(b"checkpoint.safetensorsP", b"checkpoint.safetensor$P"))
     damaged = r"unfinished/study/a/b-0.*zip is damaged.*delete it"
     with pytest.raises(StorageError, match=damaged), shelf.resumed("a/b-0", told, other):
+        pass
+    locked = whole.replace(b"PK\3\4\x14\0\0", b"PK\3\4\x14\0\1").replace(
+        b"PK\1\2\x14\3\x14\0\0", b"PK\1\2\x14\3\x14\0\1"
+    )
+    place.write(there, locked)
+    said = r"encrypted.*delete it"
+    with pytest.raises(StorageError, match=said), shelf.resumed("a/b-0", told, other):
         pass
     place.write(there, whole[:-30])
     with pytest.raises(StorageError, match="is damaged"), shelf.resumed("a/b-0", told, other):
@@ -234,6 +249,22 @@ def test_seeds_on_a_place_give_what_they_give_in_a_folder(files, url):
 def test_one_training_wants_a_folder(tmp_path, capsys):
     assert main(["train", "--out", f"file://{tmp_path}/x"]) == 2
     assert f"out is file://{tmp_path}/x, a place: expected with --seeds" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        *(["train", "--out"], ["train", "--seeds", "0", "--out"], ["study", "none.yaml", "--out"]),
+        *(["demo", "--env.bank"], ["bank", "info"], ["bank", "verify"], ["fetch", "--out", "x"]),
+        ["render", "--to"],
+    ],
+)
+def test_a_password_in_a_url_is_told_by_no_command(words, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main([*words, "s3://key:secret@shelf/x"]) in (1, 2)
+    told = capsys.readouterr()
+    assert "secret" not in told.out + told.err and "has a password" in told.err
+    assert list(tmp_path.iterdir()) == []
 
 
 def played(files) -> list[Job]:

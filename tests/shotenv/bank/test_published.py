@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import uuid
 from dataclasses import replace
 from pathlib import Path
@@ -11,19 +13,23 @@ import pytest
 import torch
 from cut_off_places import CutOffFileSystem
 
+from shotenv.bank import published
 from shotenv.bank.clip_jobs import ClipJob, clip_jobs
 from shotenv.bank.files import (
     BankError,
     bank_folder,
     fetched_banks,
     read_clip_record,
+    read_manifest,
     verify,
     write_clip,
     write_manifest,
 )
 from shotenv.bank.files.layout import ARRAYS
+from shotenv.bank.listing.contents import contents_at, contents_of as told_of
 from shotenv.bank.opening import find_thinned, open_bank
 from shotenv.bank.published import (
+    build_published,
     finish_published,
     publish_bank,
     publish_clip,
@@ -34,7 +40,7 @@ from shotenv.bank.thinned import ThinnedBank
 from shotenv.config.bank import BankConfig
 from shotenv.config.reader import merged
 from unwrap.storage.place import Place, StorageError
-from unwrap.storage.publishing import publish_contents
+from unwrap.storage.publishing import publish_contents, publish_part
 
 HEIGHT, WIDTH, FRAMES = 24, 32, 2
 
@@ -115,6 +121,20 @@ def test_a_bank_rendered_to_a_place_is_byte_for_byte_that_of_a_folder(config, ur
     assert torch.equal(bank.distance_m(torch.tensor([5])), bank.frame(5).exposure.distance_m)
 
 
+def test_what_is_in_a_bank_is_told_without_its_arrays(config, url, full, thinned, tmp_path):
+    render_to(url, config, tmp_path / "scratch")
+    published = [(open_bank(folder_of(config, tmp_path / "here")), url)]
+    for number, bank in enumerate((full, thinned)):
+        publish_bank(bank, f"{url}/{number}")
+        published.append((bank, f"{url}/{number}"))
+    for bank, where in published:
+        here, there = told_of(bank), contents_at(where)
+        assert there.pop("folder") == where and there.pop("bytes") > 0.9 * here.pop("bytes")
+        del here["folder"]
+        assert there == here
+    assert not fetched_banks().exists()
+
+
 def test_an_opened_bank_is_fetched_once(config, tmp_path):
     CutOffFileSystem.reset(empty=True)
     url = "cutoff://banks/small"
@@ -178,6 +198,21 @@ def test_what_is_missing_or_another_bank_is_named(config, url, tmp_path):
         render_to(url, other, tmp_path / "other")
 
 
+def test_a_place_that_cannot_be_written_is_refused_before_anything_is_rendered(
+    config, monkeypatch, full
+):
+    def denied(*_, **__):
+        raise PermissionError("Access Denied")
+
+    CutOffFileSystem.reset(empty=True)
+    monkeypatch.setattr(CutOffFileSystem, "pipe_file", denied)
+    monkeypatch.setattr(published, "render_clips", lambda *_: pytest.fail("rendered"))
+    monkeypatch.setattr(published, "publish_part", lambda *_, **__: pytest.fail("published"))
+    for work in (build_published, publish_bank):
+        with pytest.raises(StorageError, match=r"cannot write cutoff://denied/x.*Access Denied"):
+            work(config if work is build_published else full, "cutoff://denied/x")
+
+
 def test_a_damaged_record_of_a_clip_is_named(config, url, tmp_path):
     render_to(url, config, tmp_path / "scratch")
     place = Place(url)
@@ -213,6 +248,62 @@ def test_a_fetched_bank_that_is_damaged_tells_its_own_cure(config, url, tmp_path
     (folder / "clips" / "00000-garage" / "active.npy").write_bytes(b"")
     with pytest.raises(BankError, match=f"delete {folder}, and it is fetched again"):
         open_bank(url)
+
+
+def test_a_part_that_is_no_clip_is_named(config, url, tmp_path):
+    """Who can write to the place may have put there what no rendering publishes."""
+    render_to(url, config, tmp_path / "scratch")
+    place, label = Place(url), bank_folder(config).name
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "manifest.json").write_text("{}")
+    for names, under in (([], "clips/00000-garage"), (["manifest.json"], "")):
+        (tmp_path / "other" / "clip.json").write_text("[]")
+        publish_part(
+            place, label, "00000-garage", tmp_path / "other", [*names, "clip.json"][:1], under=under
+        )
+        said = "lists what is no clip" if names else "record of clip 00000-garage, is damaged"
+        with pytest.raises(BankError, match=said):
+            finish_published(url, config)
+
+
+@pytest.mark.parametrize("where", ["notes.txt", "clips/00000-garage/clip.json", "clips/more"])
+def test_links_out_of_a_bank_are_not_published(config, url, tmp_path, where):
+    """Whoever made the bank may have meant somebody's keys."""
+    (tmp_path / "private").mkdir()
+    (tmp_path / "private" / "key").write_text("secret")
+    folder = folder_of(config, tmp_path / "here")
+    (folder / where).unlink(missing_ok=True)
+    (folder / where).symlink_to(tmp_path / "private" / ("" if where == "clips/more" else "key"))
+    with pytest.raises(BankError, match=f"{where} leads to .*private.*, out of the bank"):
+        publish_bank(open_bank(folder), url)
+    assert Place(url).sizes("objects") == {}
+    # Within it they are as good as copies.
+    (folder / where).unlink()
+    (folder / where).symlink_to(folder / "clips" / "00001-garage" / "clip.json")
+    publish_bank(open_bank(folder), url)
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize("kind", ["a pipe", "a folder"])
+def test_what_is_no_file_is_named_and_not_waited_for(config, url, tmp_path, kind):
+    folder = folder_of(config, tmp_path / "here")
+    odd = folder / "clips" / "00000-garage" / "odd"
+    os.mkfifo(odd) if kind == "a pipe" else odd.mkdir()
+    with pytest.raises(StorageError, match="odd cannot be published: not a regular file"):
+        publish_bank(open_bank(folder), url)
+
+
+@pytest.mark.parametrize("name", ["../../x", "/etc/x", "a\x1b[31m", "a\nb", ""])
+def test_names_of_banks_are_no_paths_and_show_as_they_are(config, tmp_path, name):
+    folder = folder_of(config, tmp_path / "here")
+    records = read_manifest(folder).clips
+    with pytest.raises(ValueError, match="name"):
+        write_manifest(folder, name, records, (HEIGHT, WIDTH), config)
+    told = json.loads((folder / "manifest.json").read_text()) | {"name": name}
+    del told["digest"]
+    (folder / "manifest.json").write_text(json.dumps(told))
+    with pytest.raises(BankError, match=r"manifest\.json is damaged \(name"):
+        open_bank(folder)
 
 
 def test_what_is_no_bank_is_refused(url, tmp_path):

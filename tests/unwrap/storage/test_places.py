@@ -254,11 +254,52 @@ def test_a_missing_backend_is_one_sentence():
     )
 
 
-def test_passwords_are_never_shown():
-    assert Place("memory://someone:secret@shelf").url == "memory://shelf"
-    with pytest.raises(StorageError) as refusal:
-        Place("sftp2://someone:secret@host/x")
-    assert "secret" not in str(refusal.value)
+@pytest.mark.parametrize(
+    "url",
+    [
+        *("s3://key:secret@shelf/x", "s3://key:a/secret@shelf/x", "s3://key:a@secret@shelf"),
+        *("memory://:secret@shelf", "https://host/x?token=secret", "abfs://x/y?sig=secret#z"),
+    ],
+)
+def test_passwords_in_urls_are_refused_and_never_shown(url):
+    with pytest.raises(StorageError, match="has a password or a question in it") as refusal:
+        Place(url)
+    assert "secret" not in str(refusal.value) and url.partition("://")[0] in str(refusal.value)
+
+
+def test_users_and_colons_in_paths_are_welcome(tmp_path):
+    assert Place("memory://container@account/x").url == "memory://container@account/x"
+    place = Place(f"file://{tmp_path}/12:30@lab?")
+    place.write("note", b"x")
+    assert (tmp_path / "12:30@lab?" / "note").read_bytes() == b"x"
+
+
+def test_chained_urls_are_refused(tmp_path):
+    """A file that lies at one of them could name any other file to be read."""
+    secret, names = tmp_path / "secret", tmp_path / "names.json"
+    secret.write_text("secret")
+    names.write_text(json.dumps({"version": 1, "refs": {"contents.json": [f"file://{secret}"]}}))
+    with pytest.raises(StorageError, match="made of several; expected one URL"):
+        Place(f"reference::file://{names}").read("contents.json", most_bytes=100)
+
+
+def test_a_backend_that_fails_at_once_is_one_sentence():
+    with pytest.raises(StorageError, match=r"ftp://127\.0\.0\.1:1/x is no place: .*refused"):
+        Place("ftp://127.0.0.1:1/x")
+
+
+def test_nothing_is_made_of_a_bucket_that_is_missing(monkeypatch):
+    """As s3fs and gcsfs answer; asked to make its folders they would make the bucket."""
+    made = []
+
+    def missing(_, path, value, **__):
+        raise FileNotFoundError("The specified bucket does not exist")
+
+    monkeypatch.setattr(CutOffFileSystem, "pipe_file", missing)
+    monkeypatch.setattr(CutOffFileSystem, "makedirs", lambda *_, **__: made.append(1))
+    with pytest.raises(StorageError, match="cannot write cutoff://misspelt/x/a"):
+        Place("cutoff://misspelt/x").write("a", b"")
+    assert made == []
 
 
 def test_urls_are_told_from_names_and_paths():

@@ -5,10 +5,12 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from unwrap.support.files import building_folder, replacing, unfinished, write_text
+from unwrap.support.whole_files import open_regular
 
 PROGRAM = """
 import os, signal, sys
@@ -70,3 +72,10 @@ def test_a_full_disk_is_told_with_the_file(tmp_path):
     with pytest.raises(OSError, match=r"No space left.*results\.json"), replacing(path):
         raise OSError(28, "No space left on device")
     assert names(tmp_path) == []
+
+
+def test_a_folder_is_no_regular_file_and_stays_closed(tmp_path):
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    with pytest.raises(ValueError, match="not a regular file"):
+        open_regular(tmp_path)
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
