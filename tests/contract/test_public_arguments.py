@@ -22,7 +22,7 @@ OTHER_KINDS = (
     *(MAP.numpy(), None, "x", [1.0, 2.0], {}, object()),
     *(MAP.to(torch.complex64), MAP.long(), torch.zeros(0), torch.rand(2, 2), torch.rand(2, 3, 5)),
 )
-NUMBERS = ("x", None, [1.0], MAP, float("nan"), -1.0, float("inf"))
+NUMBERS = ("x", None, [1.0], MAP, float("nan"), -1.0, float("inf"), 1e300, 1e-300, 10**400, 1j)
 PATHS = (MAP, None, 3, [], b"x", object())
 
 
