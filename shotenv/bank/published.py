@@ -41,10 +41,10 @@ from unwrap.storage import (
     StoredFile,
     damaged_files,
     fetch,
+    place_to_publish,
     publish_contents,
     publish_part,
     read_contents,
-    require_label,
     standing_parts,
 )
 from unwrap.support import progress, say, write_json
@@ -71,8 +71,7 @@ def build_published(
     BankError, RendererError, WorkerError
         As of `build_bank`.
     """
-    place = Place(url)
-    require_label(place, bank_folder(config).name)
+    place = place_to_publish(url, bank_folder(config).name)
     standing = standing_clips(url, config)
     jobs = clip_jobs(config, Path())
     missing = [replace(job, url=url) for job in jobs if job.name not in standing]
@@ -164,15 +163,19 @@ def publish_bank(bank: Bank, url: str) -> Listing:
 
     Raises
     ------
+    BankError
+        The place is a folder of the bank's.
     unwrap.storage.StorageError
         The place holds another bank, or cannot be written.
     """
-    place, folder = Place(url), bank.folder
+    folder, target = bank.folder.resolve(), Place(url).folder
+    if target is not None and target.resolve().is_relative_to(folder):
+        raise BankError(f"{url} lies in the bank, {folder}; expected a place outside of it")
     if isinstance(bank.manifest, Manifest) and bank.config is not None:
         label = bank_folder(bank.config).name  # As `publish_clip` has it.
     else:
         label = f"{bank.name}-{bank.fingerprint[:8]}"
-    require_label(place, label)
+    place = place_to_publish(url, label)
     clips = [
         clip.folder for clip in bank.manifest.clips if isinstance(clip, ClipRecord | RecordedClip)
     ]

@@ -7,9 +7,9 @@ from .listing import (
 from .place import Place as Place, StorageError as StorageError, is_url as is_url
 from .publishing import (
     find_part as find_part,
+    place_to_publish as place_to_publish,
     publish_contents as publish_contents,
     publish_part as publish_part,
     read_contents as read_contents,
-    require_label as require_label,
     standing_parts as standing_parts,
 )

@@ -122,6 +122,20 @@ def require_label(place: Place, label: str) -> None:
         )
 
 
+def place_to_publish(url: str, label: str) -> Place:
+    """A place where `label` may be published, before the work begins that makes it.
+
+    Raises
+    ------
+    StorageError
+        It holds something else, or cannot be written.
+    """
+    place = Place(url)
+    require_label(place, label)
+    place.require_writable()
+    return place
+
+
 def read_contents(place: Place) -> Listing:
     """What was published there.
 

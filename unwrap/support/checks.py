@@ -42,7 +42,7 @@ def require_positive(**values: Any) -> None:
     for name, value in values.items():
         if not isinstance(value, numbers.Real) or isinstance(value, bool):
             raise TypeError(f"{name} is {type(value).__name__}; expected a number")
-        if not 1e-15 <= value <= 1e15:
+        if not 1e-15 <= value <= 1e15:  # type: ignore[operator]
             raise ValueError(f"{name} is {value}; expected a positive number, 1e-15..1e15")
 
 
