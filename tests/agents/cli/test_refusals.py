@@ -9,8 +9,8 @@ import pytest
 
 from agents.cli.entry import main
 
-RENDER, STUDY, TABLE = ("render",), ("study", "study.yaml"), ("unwrap", "table")
-PARALLEL = (RENDER, STUDY, TABLE, ("train", "--seeds", "1"))
+RENDER, STUDY = ("render",), ("study", "study.yaml")
+PARALLEL = (RENDER, STUDY, ("train", "--seeds", "1"))
 RECORD = ("record", "--camera", "mlx75027", "--out", "new")
 
 
@@ -74,7 +74,7 @@ def test_workers_that_cannot_be_had(capsys, monkeypatch, command):
         (("study", "nowhere.yaml"), "nowhere.yaml: No such file"),
         (("bank", "verify", ""), "the first argument is empty"),
         (("bank", "publish", "pocket", "--to", "folder"), "folder is no URL"),
-        (("unwrap", "train", "--devices", "x"), "devices: x; expected int"),
+        (("evaluate", "empty", "--budget", "x"), "budget: x; expected float"),
         (("train", "--seeds", "-1"), "seeds: -1; expected at least 0"),
         ((*RECORD[:-1], "full"), "full is not an empty folder; nothing is written over"),
         ((*RECORD, "--drives", "1000000000000"), "drives is 1000000000000; expected at most"),
@@ -104,7 +104,9 @@ def test_a_bank_is_not_published_into_itself(capsys, tiny_bank):
 
 def test_a_server_that_does_not_answer_is_no_place_without_a_bank(capsys):
     address = unheard_of()
-    refused(capsys, ("bank", "verify", f"http://{address}/bank"), f"cannot read http://{address}/bank")
+    refused(
+        capsys, ("bank", "verify", f"http://{address}/bank"), f"cannot read http://{address}/bank"
+    )
 
 
 def test_a_seed_that_no_training_takes_is_told_before_the_others_begin(
