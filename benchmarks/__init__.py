@@ -11,7 +11,8 @@
 - `networks`: arithmetic of inference and training as a share of a large matrix product's, and what
   the public face of a network costs beside it;
 - `scaling`: clips rendered by Ray over processes of this machine; two workers over twice one; and
-  milliseconds that a task without work takes.
+  milliseconds that a task without work takes;
+- `together`: training on two processes of one thread over one of two threads.
 
 A ratio says what the code makes of a machine, and hardly depends on which. As tests do, benchmarks
 import by file what is behind a door because no other room may use it (the writer of a bank, the

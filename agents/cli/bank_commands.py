@@ -15,6 +15,7 @@ from agents.cli.command import (
     add_config,
     add_executor,
     add_json,
+    add_place,
     execution_of,
     section_of,
     write_numbers,
@@ -27,9 +28,7 @@ def render_arguments(parser: ArgumentParser) -> None:
     """What is rendered, where to, and where it is computed."""
     add_config(parser, BankConfig, "bank/starter.yaml")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the bank")
-    parser.add_argument(
-        "--to", metavar="URL", help="a place in its stead, such as s3://bucket/bank"
-    )
+    add_place(parser, "a place in its stead, such as s3://bucket/bank")
     parser.add_argument(
         "--scene", type=Path, metavar="FILE", help="render this scene (XML, PLY, OBJ, STL, GLB)"
     )
@@ -146,9 +145,7 @@ def _verify_published(arguments: Namespace) -> int:
 def publish_arguments(parser: ArgumentParser) -> None:
     """Which bank, and where to."""
     parser.add_argument("bank", help="name or path of a bank that stands")
-    parser.add_argument(
-        "--to", required=True, metavar="URL", help="place, such as s3://bucket/bank"
-    )
+    add_place(parser, "place, such as s3://bucket/bank", required=True)
 
 
 def publish(arguments: Namespace) -> int:

@@ -11,6 +11,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 from importlib.metadata import version
+from itertools import pairwise
 
 from jsonargparse import ArgumentError, Namespace
 
@@ -26,8 +27,17 @@ from agents.cli import (
     unwrap_commands,
 )
 from agents.cli.cameras import CALIBRATE, CORRECT, DESCRIBE, RECORD
-from agents.cli.command import DONE, FAILED, INTERRUPTED, WRONG_USAGE, Command, check_outputs
+from agents.cli.command import (
+    DONE,
+    FAILED,
+    INTERRUPTED,
+    WRONG_USAGE,
+    Command,
+    check_outputs,
+    execution_of,
+)
 from shotenv.config import ConfigError, imports_refused, one_sentence
+from unwrap.execution import check_execution
 
 OWN_PACKAGES = ("agents", "shotenv", "unwrap")
 USUAL_FORMAT = warnings.formatwarning
@@ -125,6 +135,13 @@ def _parsed(command: Command, words: list[str]) -> Namespace:
         An unknown argument or key, or a value that is of no use; one sentence that names it.
     """
     parser = command.parser()
+    for before, word in pairwise(("", *words)):
+        # As a path it would be the present folder.
+        if not word or re.fullmatch("--[^=]+=", word):
+            name = word or before
+            raise ConfigError(
+                f"{name.strip('-=') or 'the first argument'} is empty; expected a value"
+            )
     try:
         with imports_refused():
             arguments = parser.instantiate(parser.parse_args(words))
@@ -132,18 +149,31 @@ def _parsed(command: Command, words: list[str]) -> Namespace:
         raise ConfigError(_plain(one_sentence(error))) from None
     # Before minutes are spent on what could not be written then.
     check_outputs(arguments, out_is_file=command.out_is_file)
+    if "executor" in arguments:
+        check_execution(**execution_of(arguments))
     return arguments
 
 
 def _plain(message: str) -> str:
     """A validation message without what only the libraries' authors need."""
     # In turn: where jsonargparse found it, pydantic's count of errors, its and jsonargparse's words
-    # for what was expected, and pydantic's note on the value.
+    # for what was expected, what it says of a file twice, and pydantic's note on the value.
     for pattern, kept in (
-        (r'Parser key "([^"]+)": ', r"\1: "),
+        (r'Parser key "([^"]+)"(?: element \d+)?: ', r"\1: "),
         (r"\d+ validation errors? for [\w-]+ ", ""),
         (r"Input should be", "expected to be"),
         (r"Not of type \w+: (\S+) does not conform to restriction v>0", r"\1; expected above 0"),
+        (
+            r"Not of type \w+: (\S+) does not conform to restriction v>=0",
+            r"\1; expected at least 0",
+        ),
+        (r"Not of type \w+: invalid literal for int\(\).*?: (.*)", r"\1; expected a whole number"),
+        (r"Expected a (?:typing\.)?Literal\[(.*?)\]\. Got value: (.*)", r"\2; expected one of \1"),
+        (r"Expected a <class '(\w+)'>\. Got value: (.*)", r"\2; expected \1"),
+        (
+            r"""Unable to load config '(.*?)' - .*Unable to load config ".*\"""",
+            r"\1; expected a file of keys with values",
+        ),
         (r"\[type=\w+, input_value=(.*?), input_type=\w+\]", r"(got \1)"),
     ):
         message = re.sub(pattern, kept, message)

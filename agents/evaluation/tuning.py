@@ -7,7 +7,7 @@ played side by side in one batch, since a step of many drives takes hardly longe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -17,13 +17,15 @@ from gymnasium.vector import VectorEnv
 from agents.evaluation.play import make_envs, play_drives
 from agents.policies import Action, FixedPolicy, Observation, Policy, PolicyFamily
 from shotenv.config import EnvConfig
-from shotenv.decision import FEATURE_NAMES
-from shotenv.env import ShotScheduleVectorEnv
+from shotenv.decision import FEATURE_NAMES, Problem
+from shotenv.env import ShotScheduleVectorEnv, check_options
 from unwrap.signal import Shots
 from unwrap.support import progress
 
 AT_A_TIME: Final = 12
 """Candidates that are played side by side: 12 with 12 drives each take 1.5 times as long as one."""
+MOST_DRIVES: Final = 10_000
+"""Most drives that are held in memory at once, for each of those candidates."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,17 @@ class Tuned:
 
 def tuning_envs(config: EnvConfig, drives: int) -> ShotScheduleVectorEnv:
     """Environments in which `tune` plays `AT_A_TIME` candidates on each of `drives` validation
-    drives."""
+    drives.
+
+    Raises
+    ------
+    TypeError, ValueError
+        `config` is no `EnvConfig`, or `drives` no number of drives.
+    """
+    if not isinstance(config, EnvConfig):
+        raise TypeError(f"config is {type(config).__name__}; expected an EnvConfig")
+    if not isinstance(drives, int) or not 0 < drives <= MOST_DRIVES:
+        raise ValueError(f"drives is {drives!r}; expected a whole number of 1 to {MOST_DRIVES}")
     return make_envs(config, "validation", AT_A_TIME * drives, "Disabled")
 
 
@@ -63,21 +75,52 @@ def tune(
 
     Raises
     ------
-    ValueError
-        There is no price, a family has no candidate, or `envs` are not a multiple of `seeds`.
+    TypeError, ValueError
+        There is no price, or one that cannot be set; a family has no candidate; `envs` are not a
+        multiple of `seeds`; or an argument is of another kind. The message names it.
     """
-    if not prices:
-        raise ValueError("prices is empty; expected at least one weight of power")
-    plans = {family.name: list(family.candidates(FEATURE_NAMES)) for family in families}
-    for name, plan in plans.items():
-        if not plan:
-            raise ValueError(f"candidates of family {name!r} are none; expected at least one")
+    _check_arguments(families, envs, seeds, prices)
+    plans = {family.name: _candidates(family) for family in families}
     plays = sum(len(prices) if p.reads_price else 1 for plan in plans.values() for p in plan)
     with progress(plays, "tuning on validation drives", "play") as bar:
         return {
             name: best_at_prices(plan, mean_returns(plan, envs, seeds, prices, bar.update), prices)
             for name, plan in plans.items()
         }
+
+
+def _candidates(family: PolicyFamily) -> list[Policy]:
+    """What is tried of a family; ValueError where it is nothing, or no policies."""
+    made: Any = family.candidates(FEATURE_NAMES)
+    plan = list(made) if isinstance(made, Iterable) else []
+    if not plan or not all(isinstance(policy, Policy) for policy in plan):
+        raise ValueError(
+            f"candidates of family {family.name!r} are {plan or 'none'}; expected policies, at "
+            "least one"
+        )
+    return plan
+
+
+def _check_arguments(families: Any, envs: Any, seeds: Any, prices: Any) -> None:
+    """Refuse arguments of `tune` by name."""
+    listed = {"families": families, "seeds": seeds, "prices": prices}
+    for name, value in listed.items():
+        if not isinstance(value, list | tuple | np.ndarray) or np.ndim(value) == 0:
+            raise TypeError(f"{name} is {type(value).__name__}; expected a list or tuple")
+    if not len(prices):
+        raise ValueError("prices is empty; expected at least one weight of power")
+    for family in families:
+        if not isinstance(family, PolicyFamily):
+            raise TypeError(f"families holds {type(family).__name__}; expected PolicyFamily")
+    problem = getattr(getattr(envs, "unwrapped", None), "problem", None)
+    if not isinstance(envs, VectorEnv) or not isinstance(problem, Problem):
+        raise TypeError(f"envs is {type(envs).__name__}; expected that of `tuning_envs`")
+    for name, option, values in (("seeds", "drive", seeds), ("prices", "power_price", prices)):
+        for value in values:
+            try:
+                check_options({option: value}, problem)
+            except ValueError as error:
+                raise ValueError(f"{name}: {error}") from None
 
 
 def best_at_prices(

@@ -15,7 +15,13 @@ import numpy as np
 
 from agents.policies.looking import ENERGY_SHARES, REGRETS
 from agents.policies.policy import Action, Observation, Policy, single
-from agents.policies.readings import Readings, checked_at_least, checked_energy_shares
+from agents.policies.readings import (
+    MOST,
+    Readings,
+    checked_at_least,
+    checked_energy_shares,
+    checked_seed,
+)
 
 CONTEXT: Final = (
     "gray_mean",
@@ -45,7 +51,7 @@ class LinearBanditPolicy(Policy):
     ridge : float
         Weight of the prior, which holds that all coefficients are 0.
     forget : float
-        Weight of the past after each frame of 8 DCS, in (0, 1]; 1 forgets nothing.
+        Weight of the past after each frame of 8 DCS, 1e-9..1; 1 forgets nothing.
     energy_shares : sequence of 3 floats
         Energy of 2, 4 and 8 DCS relative to 8.
     """
@@ -61,11 +67,9 @@ class LinearBanditPolicy(Policy):
         *,
         energy_shares: Sequence[float] = ENERGY_SHARES,
     ) -> None:
-        self.width = checked_at_least("width", width, 0.0)
-        self.ridge = checked_at_least("ridge", ridge, 1e-9)
-        if not 0 < forget <= 1:
-            raise ValueError(f"forget is {forget!r}; expected above 0 and at most 1")
-        self.forget = forget
+        self.width = checked_at_least("width", width, 0.0, MOST)
+        self.ridge = checked_at_least("ridge", ridge, 1e-9, MOST)
+        self.forget = checked_at_least("forget", forget, 1e-9, 1.0)
         self._shares = checked_energy_shares(energy_shares)
         self._read = Readings(feature_names, "last_eight", "power_price", *CONTEXT)
         self._context: np.ndarray | None = None
@@ -151,8 +155,8 @@ class ThompsonPolicy(LinearBanditPolicy):
         energy_shares: Sequence[float] = ENERGY_SHARES,
     ) -> None:
         super().__init__(feature_names, width, ridge, forget, energy_shares=energy_shares)
-        self._seed = seed
-        self._generator = np.random.default_rng(seed)
+        self._seed = checked_seed(seed)
+        self._generator = np.random.default_rng(self._seed)
 
     def _judged(self, mean: np.ndarray, doubt: np.ndarray) -> np.ndarray:
         # The context's regret is normal with this deviation, which is all that a draw of the

@@ -16,7 +16,7 @@ from agents.policies.policy import (
     same_action,
     single,
 )
-from agents.policies.readings import checked_frames
+from agents.policies.readings import checked_frames, checked_seed, three_numbers
 from unwrap.signal import Shots
 
 
@@ -45,9 +45,7 @@ class RandomPolicy(Policy):
     """Each action with the same probability."""
 
     def __init__(self, seed: int = 0) -> None:
-        if not isinstance(seed, int | np.integer) or seed < 0:
-            raise ValueError(f"seed is {seed!r}; expected a whole number of at least 0")
-        self._seed = seed
+        self._seed = checked_seed(seed)
         self.reset()
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
@@ -77,17 +75,13 @@ class MixturePolicy(Policy):
     """
 
     def __init__(self, probabilities: Sequence[float], seed: int = 0) -> None:
-        try:
-            shares = np.asarray(probabilities, dtype=np.float64)
-        except (TypeError, ValueError):
-            shares = np.empty(0)  # Refused below by name.
-        valid = shares.shape == (len(Shots),) and (shares >= 0).all()
-        if not valid or abs(shares.sum() - 1.0) > 1e-9:
+        shares = three_numbers(probabilities)
+        if not ((shares >= 0).all() and abs(shares.sum() - 1.0) <= 1e-9):
             raise ValueError(
                 f"probabilities is {probabilities!r}; expected three numbers >= 0 that add up to 1"
             )
         self._shares = shares
-        self._seed = seed
+        self._seed = checked_seed(seed)
         self.reset()
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
@@ -120,7 +114,7 @@ class CyclePolicy(Policy):
 
     def __init__(self, period: int, shots: int = 8, otherwise: int = 2) -> None:
         self._period = checked_frames("period", period, 2)
-        self._shots, self._otherwise = checked_shots(shots), checked_shots(otherwise)
+        self._shots, self._otherwise = checked_shots(shots), checked_shots(otherwise, "otherwise")
         self.reset()
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:

@@ -54,8 +54,9 @@ class NetworkPolicy(ScoringPolicy):
 
     Raises
     ------
-    ValueError
-        `network` has another form, or other widths than the features and actions.
+    TypeError, ValueError
+        `network` has another form, or other widths than the features and actions; `provenance` is
+        none.
 
     Examples
     --------
@@ -66,6 +67,8 @@ class NetworkPolicy(ScoringPolicy):
     """
 
     def __init__(self, network: nn.Sequential, provenance: Provenance) -> None:
+        if not isinstance(provenance, Provenance):
+            raise TypeError(f"provenance is {type(provenance).__name__}; expected a Provenance")
         self.activation = activation_of(network)
         require_widths(network, len(provenance.feature_names))
         self.network = copy.deepcopy(network).requires_grad_(False).eval()

@@ -13,6 +13,7 @@ import numpy as np
 
 from agents.policies.policy import Action, Observation, Policy, single
 from agents.policies.readings import (
+    MOST,
     Readings,
     checked_at_least,
     checked_energy_shares,
@@ -154,9 +155,9 @@ class LookAndWeighPolicy(Policy):
         near_k: float = 2.0,
         energy_shares: Sequence[float] = ENERGY_SHARES,
     ) -> None:
-        self.gain = checked_at_least("gain", gain, 0.0)
-        self.heat_price = checked_at_least("heat_price", heat_price, 0.0)
-        self.near_k = checked_at_least("near_k", near_k, 1e-6)
+        self.gain = checked_at_least("gain", gain, 0.0, MOST)
+        self.heat_price = checked_at_least("heat_price", heat_price, 0.0, MOST)
+        self.near_k = checked_at_least("near_k", near_k, 1e-6, MOST)
         self.looks = Looks(feature_names, period, change, amplitude_change, reference_frame)
         self._shares = checked_energy_shares(energy_shares)
         self._read = Readings(feature_names, "power_price", "heat_margin", *REGRETS)
@@ -200,7 +201,7 @@ class Looks:
         self.period = checked_frames("period", period, 2)
         self.change = checked_at_least("change", change, 0.0)
         self.amplitude_change = checked_at_least("amplitude_change", amplitude_change, 0.0)
-        if reference_frame not in (0, 1):
+        if not isinstance(reference_frame, int | np.integer) or reference_frame not in (0, 1):
             raise ValueError(f"reference_frame is {reference_frame!r}; expected 0 or 1")
         self.reference_frame = reference_frame
         needed = ("since_eight", "change_since_eight", "amplitude")

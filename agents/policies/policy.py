@@ -75,8 +75,8 @@ class ScoringPolicy(Policy):
         return single(np.where(allowed, self.scores(observation), -np.inf).argmax(axis=-1))
 
 
-def checked_shots(shots: int) -> Shots:
-    """`shots` as `Shots`.
+def checked_shots(shots: int, name: str = "shots") -> Shots:
+    """`shots` as `Shots`; `name` is that of the parameter.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def checked_shots(shots: int) -> Shots:
         It is not 2, 4 or 8.
     """
     if not isinstance(shots, int | np.integer) or shots not in tuple(Shots):
-        raise ValueError(f"shots is {shots!r}; expected 2, 4 or 8")
+        raise ValueError(f"{name} is {shots!r}; expected 2, 4 or 8")
     return Shots(shots)
 
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import numbers
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from typing import Any, Final
 
 import numpy as np
 
@@ -89,17 +91,26 @@ def fewest_shots(tolerable: np.ndarray) -> np.ndarray:
     return np.where(tolerable[..., 0], 0, np.where(tolerable[..., 1], 1, Shots.EIGHT.action))
 
 
-def checked_at_least(name: str, value: float, least: float) -> float:
-    """`value`, a parameter of a policy.
+MOST: Final = 1e9
+"""Largest parameter that costs are computed with: their products stay numbers."""
+
+
+def checked_at_least(name: str, value: float, least: float, most: float = np.inf) -> float:
+    """`value`, a parameter of a policy, as Python's float.
 
     Raises
     ------
     ValueError
-        It is below `least`, or no number.
+        It is below `least` or above `most`, or no number.
     """
-    if not isinstance(value, numbers.Real) or isinstance(value, bool) or not value >= least:
-        raise ValueError(f"{name} is {value!r}; expected at least {least:g}")
-    return value
+    number = np.nan
+    if isinstance(value, numbers.Real) and not isinstance(value, bool):
+        with suppress(OverflowError):  # A whole number of more than 308 digits.
+            number = float(value)
+    if not least <= number <= most:
+        bound = f" and at most {most:g}" if np.isfinite(most) else ""
+        raise ValueError(f"{name} is {value!r}; expected at least {least:g}{bound}")
+    return number
 
 
 def checked_frames(name: str, value: float, least: int) -> int:
@@ -110,9 +121,23 @@ def checked_frames(name: str, value: float, least: int) -> int:
     ValueError
         It is below `least`, or no whole number.
     """
-    if checked_at_least(name, value, least) % 1 != 0:
+    if checked_at_least(name, value, least, MOST) % 1 != 0:
         raise ValueError(f"{name} is {value!r}; expected a whole number of frames")
     return int(value)
+
+
+def checked_seed(seed: int) -> int:
+    """`seed`, of a policy's draws.
+
+    Raises
+    ------
+    ValueError
+        It is no whole number of at least 0 and below 2^63, as those of drives are.
+    """
+    whole = isinstance(seed, int | np.integer) and not isinstance(seed, bool)
+    if not whole or not 0 <= seed < 2**63:
+        raise ValueError(f"seed is {seed!r}; expected a whole number of 0 to 2^63 - 1")
+    return int(seed)
 
 
 def checked_energy_shares(energy_shares: Sequence[float]) -> np.ndarray:
@@ -121,9 +146,20 @@ def checked_energy_shares(energy_shares: Sequence[float]) -> np.ndarray:
     Raises
     ------
     ValueError
-        They are not three finite numbers of at least 0.
+        They are not three numbers of 0 to `MOST`.
     """
-    shares = np.asarray(energy_shares, dtype=np.float64)
-    if shares.shape != (len(Shots),) or not ((shares >= 0) & np.isfinite(shares)).all():
+    shares = three_numbers(energy_shares)
+    if not ((shares >= 0) & (shares <= MOST)).all():
         raise ValueError(f"energy_shares is {energy_shares!r}; expected three numbers >= 0")
     return shares
+
+
+def three_numbers(values: Any) -> np.ndarray:
+    """`values` as float64 [3], one for each of the shots; NaN where they are something else."""
+    listed = np.empty(0)
+    if isinstance(values, list | tuple | np.ndarray):
+        with suppress(ValueError):  # Lists of several lengths.
+            listed = np.asarray(values)
+    if listed.shape != (len(Shots),) or listed.dtype.kind not in "iuf":
+        return np.full(len(Shots), np.nan)
+    return listed.astype(np.float64)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numbers
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -37,7 +36,7 @@ class SnrThresholdPolicy(Policy):
     ) -> None:
         self._index = feature_index(feature_names, SNR_FEATURE)
         self.threshold = checked_at_least("threshold", threshold, 0.0)
-        self.below, self.above = checked_shots(below), checked_shots(above)
+        self.below, self.above = checked_shots(below, "below"), checked_shots(above, "above")
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
         """Shots by the side of the threshold on which the last signal-to-noise was."""
@@ -69,14 +68,11 @@ class SnrTwoThresholdPolicy(Policy):
         between: int = 4,
         above: int = 2,
     ) -> None:
-        for name, value in (("low", low), ("high", high)):
-            if not isinstance(value, numbers.Real):
-                raise TypeError(f"{name} is {type(value).__name__}; expected a number")
-        if not low <= high:
-            raise ValueError(f"low is {low!r} and high {high!r}; expected low <= high")
         self._index = feature_index(feature_names, SNR_FEATURE)
-        self.low, self.high = low, high
-        self.shots = tuple(checked_shots(shots) for shots in (below, between, above))
+        self.low = checked_at_least("low", low, 0.0)
+        self.high = checked_at_least("high", high, self.low)
+        named = {"below": below, "between": between, "above": above}
+        self.shots = tuple(checked_shots(shots, name) for name, shots in named.items())
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:
         """Shots by the band in which the last signal-to-noise was."""

@@ -60,9 +60,11 @@ def activation_of(network: nn.Sequential) -> Activation:
 
     Raises
     ------
-    ValueError
+    TypeError, ValueError
         It is not linear layers with biases and one activation, tanh or relu, between them.
     """
+    if not isinstance(network, nn.Sequential):
+        raise TypeError(f"network is {type(network).__name__}; expected an nn.Sequential")
     modules = list(network)
     between = {type(module) for module in modules[1::2]} or {nn.Tanh}
     linear = all(isinstance(m, nn.Linear) and m.bias is not None for m in modules[::2])

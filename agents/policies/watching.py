@@ -40,7 +40,7 @@ class DistanceHysteresisPolicy(Policy):
     ) -> None:
         self.near = checked_at_least("near", near, 0.0)
         self.far = checked_at_least("far", far, near)
-        self.few, self.more = checked_shots(few), checked_shots(more)
+        self.few, self.more = checked_shots(few, "few"), checked_shots(more, "more")
         self._read = Readings(feature_names, "network_distance")
         self._is_far = np.array(True)
 
@@ -84,7 +84,7 @@ class WakeOnChangePolicy(Policy):
     ) -> None:
         self.change = checked_at_least("change", change, 0.0)
         self.still_frames = checked_frames("still_frames", still_frames, 1)
-        self.asleep = checked_shots(asleep)
+        self.asleep = checked_shots(asleep, "asleep")
         self._read = Readings(feature_names, "gray_change")
         self._still = np.array(-1)
 
@@ -135,7 +135,7 @@ class MotionPolicy(Policy):
         self.way_m = checked_at_least("way_m", way_m, 0.0)
         self.turn_rad = checked_at_least("turn_rad", turn_rad, 0.0)
         self.change = checked_at_least("change", change, 0.0)
-        self.otherwise = checked_shots(otherwise)
+        self.otherwise = checked_shots(otherwise, "otherwise")
         needed = ("since_eight", "change_since_eight", "ego_speed", "yaw_rate")
         self._read = Readings(feature_names, *needed)
 
@@ -186,7 +186,7 @@ class UnsurePolicy(Policy):
     ) -> None:
         self.confidence = checked_at_least("confidence", confidence, 0.0)
         self.disagreement = checked_at_least("disagreement", disagreement, 0.0)
-        self.otherwise = checked_shots(otherwise)
+        self.otherwise = checked_shots(otherwise, "otherwise")
         self._read = Readings(feature_names, "network_confidence", "two_from_four")
 
     def act(self, observation: Observation, info: Mapping[str, Any] | None = None) -> Action:

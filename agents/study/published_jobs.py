@@ -10,7 +10,13 @@ from typing import Any, Final
 from agents.study.jobs import Job
 from agents.study.published_work import Shelf
 from agents.training import CHECKPOINT
-from unwrap.storage import Place, begin, publish_contents, require_storable, standing_parts
+from unwrap.storage import (
+    Place,
+    place_to_publish,
+    publish_contents,
+    require_storable,
+    standing_parts,
+)
 from unwrap.support import progress
 
 STUDY: Final = "study"
@@ -29,8 +35,7 @@ def fetch_results(url: str, jobs: Sequence[Job], folder: Path) -> None:
     """
     for job in jobs:
         require_storable(job.name)
-    place = Place(url)
-    begin(place, STUDY)
+    place = place_to_publish(url, STUDY)
     standing = standing_parts(place, STUDY)
     done = [job for job in jobs if job.name in standing]
     with progress(len(done), "fetching results", "job") as bar:

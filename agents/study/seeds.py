@@ -10,8 +10,9 @@ from typing import Final, NamedTuple
 from agents.config import DemoConfig
 from agents.study.published_work import Shelf
 from agents.training import train_scheduler
+from shotenv.config import merged
 from unwrap.execution import Executor, output_to, run_tasks, visible
-from unwrap.storage import Place, begin, publish_contents, standing_parts
+from unwrap.storage import Place, place_to_publish, publish_contents, standing_parts
 from unwrap.support import progress
 
 TRAININGS: Final = "trainings"
@@ -50,24 +51,22 @@ def train_seeds(
     Raises
     ------
     ValueError
-        A seed comes twice; or trainings failed, after all others were run.
+        A seed comes twice, or cannot be `agent.seed`; or trainings failed, after all others were
+        run.
     unwrap.storage.StorageError
         The place holds something else, or cannot be read or written.
     """
     if len(set(seeds)) < len(seeds):
         raise ValueError(f"seeds are {', '.join(map(str, seeds))}; expected each once")
+    agents = [merged(config.agent, {"seed": seed}) for seed in seeds]
     url, folder = (out, Path()) if isinstance(out, str) else (None, out.resolve())
     if url is None:
         folder.mkdir(parents=True, exist_ok=True)
     else:
-        begin(Place(url), TRAININGS)
+        place_to_publish(url, TRAININGS)
     tasks = [
-        SeedTask(
-            config.model_copy(update={"agent": config.agent.model_copy(update={"seed": seed})}),
-            folder / f"seed-{seed}",
-            url,
-        )
-        for seed in seeds
+        SeedTask(config.model_copy(update={"agent": agent}), folder / f"seed-{agent.seed}", url)
+        for agent in agents
     ]
     failed = []
     with progress(len(tasks), "trainings", "seed") as bar:

@@ -41,9 +41,9 @@ from unwrap.storage import (
     Listing,
     Place,
     StoredFile,
-    begin,
     damaged_files,
     fetch,
+    place_to_publish,
     publish_contents,
     publish_part,
     read_contents,
@@ -76,8 +76,7 @@ def build_published(
     BankError, RendererError, WorkerError
         As of `build_bank`.
     """
-    place = Place(url)
-    begin(place, bank_folder(config).name)
+    place = place_to_publish(url, bank_folder(config).name)
     standing = standing_clips(url, config)
     jobs = clip_jobs(config, Path())
     missing = [replace(job, url=url) for job in jobs if job.name not in standing]
@@ -181,20 +180,22 @@ def publish_bank(bank: Bank, url: str) -> Listing:
     Raises
     ------
     BankError
-        It has links that lead out of its folder.
+        It has links that lead out of its folder, or the place is a folder of its own.
     ValueError
         Its name cannot be part of a path.
     unwrap.storage.StorageError
         The place holds another bank, or cannot be written; or something is no regular file.
     """
-    place, folder = Place(url), bank.folder
+    folder, target = bank.folder.resolve(), Place(url).folder
+    if target is not None and target.resolve().is_relative_to(folder):
+        raise BankError(f"{url} lies in the bank, {folder}; expected a place outside of it")
     if isinstance(bank.manifest, Manifest) and bank.config is not None:
         label = bank_folder(bank.config).name  # As `publish_clip` has it.
     else:
         label = f"{bank.name}-{bank.fingerprint[:8]}"
     require_storable(label)
     _require_within(folder)
-    begin(place, label)
+    place = place_to_publish(url, label)
     clips = [
         clip.folder for clip in bank.manifest.clips if isinstance(clip, ClipRecord | RecordedClip)
     ]

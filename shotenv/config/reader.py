@@ -21,6 +21,9 @@ limit_yaml()
 Model = TypeVar("Model", bound=Section)
 UNKNOWN_KEY = re.compile(r"does not accept option '([\w.]+)'")
 """What jsonargparse says of a key that a file has and its section has not."""
+NO_MAPPING = re.compile(r"""^.*Parser key "([\w.]+)": Unable to load config "(.*)"$""")
+NOT_LOADED = re.compile(r"""^Parser key "config": Unable to load config '.*?' - """)
+"""What it says of a file that is a word or a list, and before what YAML says of it."""
 MOST_COMPLAINTS, LONGEST_VALUE = 8, 120
 """Told of one file, which may be wrong in thousands of places; characters of a wrong value."""
 
@@ -73,6 +76,10 @@ def read_config(model: type[Model], path: Path, overrides: Sequence[str] = ()) -
         sentence = one_sentence(error)
         if (unknown := UNKNOWN_KEY.search(sentence)) is not None:
             sentence = _unknown(unknown[1].split("."), model)
+        if (word := NO_MAPPING.search(sentence)) is not None:
+            sentence = _no_mapping(*word.groups())
+        # Some of these errors begin with the file.
+        sentence = NOT_LOADED.sub("", sentence).removeprefix(f"{path.name}: ")
         raise ConfigError(f"{path.name}: {sentence}") from None
 
 
@@ -86,6 +93,8 @@ def one_sentence(error: Exception, model: type[Section] | None = None) -> str:
         told = "; ".join(_complaint(detail, model) for detail in found[:MOST_COMPLAINTS])
         left = len(found) - MOST_COMPLAINTS
         return f"{told}; and {left} more" if left > 0 else told
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror  # Whoever tells it names the file.
     kept = [line.strip() for line in str(error).splitlines() if "errors.pydantic.dev" not in line]
     return " ".join(" ".join(kept).replace("config.", "").split())
 
@@ -114,6 +123,13 @@ def _unknown(place: Sequence[Any], model: Any) -> str:
             return f"unknown key {'.'.join(map(str, place[:depth]))}; expected one of {known}"
         model = fields[key].annotation if fields else None
     return f"unknown key {'.'.join(map(str, place))}"
+
+
+def _no_mapping(key: str, value: str) -> str:
+    """Refusal of a word, a list or no file where the section `key` is to be, or the whole."""
+    if key == "config":
+        return "expected keys with values"
+    return f"{key} is {value!r}; expected keys with values, or a YAML file of them"
 
 
 def merged(base: Model, changes: Mapping[str, Any]) -> Model:

@@ -18,6 +18,8 @@ from unwrap.signal import Shots
 OBSERVATIONS = ("features", "image")
 RENDER_MODES = ("rgb_array", "human")
 ACTIONS = len(Shots)
+MOST_ENVS = 1_000_000
+"""Largest batch: more drives at once only take memory."""
 CHANNELS = ("gray", "last depth", "last validity")
 IMAGE_SHAPE = (len(CHANNELS), 60, 80)
 
@@ -126,10 +128,10 @@ def check_count(num_envs: Any) -> int:
     Raises
     ------
     ValueError
-        It is no whole number of at least 1.
+        It is no whole number of 1 to `MOST_ENVS`.
     """
-    if not isinstance(num_envs, int) or num_envs < 1:
-        raise ValueError(f"num_envs is {num_envs!r}; expected a whole number of at least 1")
+    if not isinstance(num_envs, int) or not 1 <= num_envs <= MOST_ENVS:
+        raise ValueError(f"num_envs is {num_envs!r}; expected a whole number of 1 to {MOST_ENVS}")
     return num_envs
 
 

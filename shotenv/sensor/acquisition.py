@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from shotenv.config import SensorConfig
+from shotenv.sensor.acquisition_checks import check_acquisition
 from shotenv.sensor.converter import signed_limits_lsb
 from shotenv.sensor.electrons import electrons_per_radiance_second
 from shotenv.sensor.exposure import Exposure
@@ -50,12 +51,12 @@ def expose(
 
     Raises
     ------
-    ValueError
-        The light is NaN, infinite or of the wrong shape; the message names the array.
+    TypeError, ValueError
+        An argument is of another kind or shape, or holds NaN or a number beyond what a sensor could
+        meet; the message names it.
     """
+    check_acquisition(exposure, sensor, shots, laser_power_w, integration_s, noise, offsets)
     shots = Shots(shots)
-    check_exposure(exposure, shots)
-    check_settings(exposure, shots, laser_power_w, integration_s, noise)
     # `acquire` takes noise sample by sample, as the streams draw it.
     samples = None if noise is None else noise.unbind(1)
     light = incident_light(exposure, sensitivity(sensor, laser_power_w, integration_s))
@@ -243,51 +244,3 @@ def pixel_of(sensor: SensorConfig) -> Pixel:
         low_lsb=np.float32(low_lsb),
         high_lsb=np.float32(high_lsb),
     )
-
-
-def check_exposure(exposure: Exposure, shots: Shots) -> None:
-    """Refuse light that cannot be acquired.
-
-    Raises
-    ------
-    ValueError
-        Too few samples, a shape that does not fit, NaN or infinity; the message names the array.
-    """
-    batch, samples, height, width = exposure.correlation.shape
-    if samples < shots:
-        raise ValueError(f"correlation has {samples} samples; expected at least {int(shots)}")
-    maps = {"active": exposure.active, "ambient": exposure.ambient}
-    for name, value in maps.items():
-        if value.shape != (batch, height, width):
-            raise ValueError(f"{name} is {tuple(value.shape)}; expected {(batch, height, width)}")
-        if not bool((value >= 0).all()):
-            raise ValueError(f"{name} holds NaN or a negative radiance; expected finite values")
-    for name, value in {"correlation": exposure.correlation[:, :shots], **maps}.items():
-        if not bool(torch.isfinite(value).all()):
-            raise ValueError(f"{name} holds NaN or infinity; expected finite radiance")
-
-
-def check_settings(
-    exposure: Exposure,
-    shots: Shots,
-    laser_power_w: Tensor,
-    integration_s: Tensor,
-    noise: Tensor | None,
-) -> None:
-    """Refuse laser power, integration time or noise that do not fit the light.
-
-    Raises
-    ------
-    ValueError
-        A shape that does not fit, a negative or not finite setting; the message names it.
-    """
-    batch, _, height, width = exposure.correlation.shape
-    for name, value in {"laser_power_w": laser_power_w, "integration_s": integration_s}.items():
-        if value.shape != (batch,) or not bool(((value >= 0) & torch.isfinite(value)).all()):
-            raise ValueError(f"{name} is {value.tolist()}; expected {batch} finite values >= 0")
-    if noise is None:
-        return
-    expected = (batch, int(shots), 2, height, width)
-    fits = noise.ndim == 5 and noise[:, :shots].shape == expected
-    if not fits or not bool(torch.isfinite(noise).all()):
-        raise ValueError(f"noise is {tuple(noise.shape)}; expected finite normals {expected}")

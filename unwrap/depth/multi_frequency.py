@@ -17,6 +17,8 @@ from unwrap.support import loop, require_floats, require_positive
 Array = np.ndarray
 # float32, since a Python float would make the arithmetic of a loop float64.
 ZERO, FAR, TWO_PI = np.float32(0.0), np.float32(1e9), np.float32(2 * np.pi)
+MOST_WRAPS = 10_000
+"""Candidates of f1 that are searched, at most: each is a pass over all pixels."""
 
 
 def unwrap_frequencies(
@@ -132,7 +134,10 @@ def fusing_shares(frequencies_hz: Sequence[float]) -> tuple[float, ...]:
 def check_phases(
     phases_rad: Tensor | Sequence[Tensor], frequencies_hz: Sequence[float], max_range_m: float
 ) -> None:
-    """Raise ValueError unless there are one to three phases, alike, and as many frequencies."""
+    """Raise ValueError unless there are one to three phases, alike, and as many frequencies.
+
+    Where the range has more wraps than can be searched, too.
+    """
     if not isinstance(frequencies_hz, Sequence):
         raise TypeError(
             f"frequencies_hz is {type(frequencies_hz).__name__}; expected 1 to 3 numbers"
@@ -155,6 +160,12 @@ def check_phases(
             )
     named = {f"f{number}_hz": hz for number, hz in enumerate(frequencies_hz, 1)}
     require_positive(**named, max_range_m=max_range_m)
+    range_m = unambiguous_range_m(frequencies_hz[0])
+    if max_range_m / range_m > MOST_WRAPS:
+        raise ValueError(
+            f"max_range_m is {max_range_m:g}; expected at most {MOST_WRAPS} unambiguous ranges of "
+            f"f1_hz, of {range_m:g} m each"
+        )
 
 
 def _wraps_of_two(

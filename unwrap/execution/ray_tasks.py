@@ -14,6 +14,7 @@ import uuid
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -200,6 +201,19 @@ def _require_answer(address: str) -> None:
             f"{ADDRESS} is {address!r}, where nobody answers ({error.strerror or error}); expected "
             "host:port of the machine on which `ray start --head` was called"
         ) from None
+
+
+def require_ray() -> None:
+    """Refuse a Ray that is not installed, or a cluster that is not there, without loading Ray.
+
+    Raises
+    ------
+    ImportError, ConnectionError
+    """
+    if find_spec("ray") is None:
+        _imported()
+    if address := os.environ.get(ADDRESS):
+        _require_answer(address)
 
 
 def _imported() -> Any:

@@ -2,17 +2,45 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from typing import TypeVar, get_args
 
+from unwrap.execution.cores import available_cores
 from unwrap.execution.processes import run_in_processes
-from unwrap.execution.ray_tasks import run_on_ray
+from unwrap.execution.ray_tasks import ADDRESS, require_ray, run_on_ray
 from unwrap.execution.work import Executor, Work, task_name
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
+MOST_PER_CORE = 16
+"""Workers for each core: more would only take memory."""
 RUNNERS = {"local": run_in_processes, "ray": run_on_ray}
+
+
+def check_execution(executor: Executor, workers: int | None) -> None:
+    """Refuse workers that cannot be had: commands ask before they work for minutes.
+
+    Raises
+    ------
+    ValueError
+        Another executor, or a number of workers that is below 1, or beyond what one machine bears.
+    ImportError, ConnectionError
+        Ray is not installed, or nobody answers where `RAY_ADDRESS` says.
+    """
+    if executor not in RUNNERS:
+        raise ValueError(
+            f"executor is {executor!r}; expected one of {', '.join(get_args(Executor))}"
+        )
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers is {workers}; expected at least 1")
+    on_cluster = executor == "ray" and ADDRESS in os.environ
+    most = max(64, MOST_PER_CORE * available_cores())
+    if workers is not None and workers > most and not on_cluster:
+        raise ValueError(f"workers is {workers}; expected at most {most} on this machine")
+    if executor == "ray":
+        require_ray()
 
 
 def run_tasks(
@@ -69,20 +97,13 @@ def run_tasks(
     ------
     WorkerError
         `function` raised, or a worker died (with "ray", too often) or was stopped.
-    ImportError
-        Ray is not installed.
+    ValueError, ImportError, ConnectionError
+        As `check_execution`.
     """
-    for field, value in (
-        ("workers", workers),
-        ("threads", threads),
-        ("tasks_per_worker", tasks_per_worker),
-    ):
+    for field, value in (("threads", threads), ("tasks_per_worker", tasks_per_worker)):
         if value is not None and value < 1:
             raise ValueError(f"{field} is {value}; expected at least 1")
-    if executor not in RUNNERS:
-        raise ValueError(
-            f"executor is {executor!r}; expected one of {', '.join(get_args(Executor))}"
-        )
+    check_execution(executor, workers)
     work = Work(function, prepare, passing, gpu)
     run = RUNNERS[executor](work, iter(tasks), workers, threads, tasks_per_worker)
     with closing(run):

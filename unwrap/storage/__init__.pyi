@@ -11,8 +11,8 @@ from .place import (
     require_plain as require_plain,
 )
 from .publishing import (
-    begin as begin,
     find_part as find_part,
+    place_to_publish as place_to_publish,
     publish_contents as publish_contents,
     publish_part as publish_part,
     read_contents as read_contents,

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+import uuid
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -105,7 +106,10 @@ class Place:
         with self._telling("read", name):
             try:
                 about = self._files.info(self._path(name))
-            except FileNotFoundError:
+            except FileNotFoundError as error:
+                # Over HTTP also where nobody answers.
+                if isinstance(error.__cause__, OSError):
+                    raise error.__cause__ from None
                 return None
         return None if about["type"] == "directory" else int(about["size"])
 
@@ -139,6 +143,28 @@ class Place:
             with source.open("rb") as content, replacing(Path(self._path(name))) as file:
                 while piece := content.read(PIECE_BYTES):
                     file.write(piece)
+
+    def require_writable(self) -> None:
+        """Write a file and take it away again: hours of work are not to end in a refusal.
+
+        Raises
+        ------
+        StorageError
+            The place cannot be written.
+        """
+        name = f"{uuid.uuid4().hex}.trial"
+        try:
+            self.write(name, b"")
+        except StorageError as error:
+            raise StorageError(str(error).replace(f"/{name}", "")) from None
+        # Some may write, but not delete; an empty file does no harm.
+        with suppress(Exception):
+            self._files.rm_file(self._path(name))
+
+    @property
+    def folder(self) -> Path | None:
+        """Where it lies on this machine; None elsewhere."""
+        return Path(self._root) if self._is_local else None
 
     def _path(self, name: str) -> str:
         return f"{self._root}/{name}" if name else self._root

@@ -122,16 +122,18 @@ def _require_label(place: Place, label: str) -> None:
         )
 
 
-def begin(place: Place, label: str) -> None:
-    """Before work whose files are to be published as `label`: refuse a place that will not do.
+def place_to_publish(url: str, label: str) -> Place:
+    """A place where `label` may be published, before the work begins that makes it.
 
     Raises
     ------
     StorageError
-        Something else was published there, or it cannot be written.
+        It holds something else, or cannot be written.
     """
+    place = Place(url)
     _require_label(place, label)
-    place.write(f"parts/{label}/begun", b"")
+    place.require_writable()
+    return place
 
 
 def read_contents(place: Place) -> Listing:

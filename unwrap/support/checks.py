@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import numbers
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,12 +35,15 @@ def require_floats(*, alike: bool = False, **values: Any) -> None:
 
 
 def require_positive(**values: Any) -> None:
-    """Raise TypeError unless all are numbers, ValueError unless they are finite and above 0."""
+    """Raise TypeError unless all are numbers, ValueError unless they lie within 1e-15..1e15.
+
+    What is outside is no frequency in hertz and no distance in metres, and overflows in float32.
+    """
     for name, value in values.items():
         if not isinstance(value, numbers.Real) or isinstance(value, bool):
             raise TypeError(f"{name} is {type(value).__name__}; expected a number")
-        if not (math.isfinite(value) and float(value) > 0):
-            raise ValueError(f"{name} is {value}; expected a positive number")
+        if not 1e-15 <= value <= 1e15:  # type: ignore[operator]
+            raise ValueError(f"{name} is {value}; expected a positive number, 1e-15..1e15")
 
 
 def require_not_negative(**values: Tensor | float) -> None:

@@ -9,7 +9,7 @@ LONGEST = 200
 def in_one_line(error: Exception) -> str:
     """What `error` says, in one line; its name where it says nothing.
 
-    A missing file is told without its path, which the message around it begins with.
+    What the system refuses is told without its path, which the message around it begins with.
 
     Examples
     --------
@@ -20,4 +20,6 @@ def in_one_line(error: Exception) -> str:
     """
     if isinstance(error, FileNotFoundError):
         return "no such file"
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror[:LONGEST]
     return " ".join(str(error).split())[:LONGEST] or type(error).__name__

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
 from jsonargparse import ArgumentParser, Namespace
 from jsonargparse.typing import NonNegativeInt, PositiveInt
@@ -18,8 +19,11 @@ from agents.cli.command import (
     section_of,
     write_numbers,
 )
-from shotenv.config import EnvConfig
+from shotenv.config import ConfigError, EnvConfig
 from unwrap.support import progress
+
+MOST_DRIVES: Final = 100_000
+"""A file each."""
 
 
 def record_arguments(parser: ArgumentParser) -> None:
@@ -44,19 +48,23 @@ def record(arguments: Namespace) -> int:
     from shotenv.env import drive_seed
     from shotenv.recorded import require_camera, write_drives
 
+    out, seeds = arguments.out, range(arguments.seed, arguments.seed + arguments.drives)
+    if arguments.drives > MOST_DRIVES:
+        raise ConfigError(f"drives is {arguments.drives}; expected at most {MOST_DRIVES}")
+    if out.is_dir() and any(out.iterdir()):
+        raise ConfigError(f"{out} is not an empty folder; nothing is written over")
     config, (camera, _) = section_of(EnvConfig, arguments), read_camera(arguments.camera)
     kept = require_camera(camera, config.sensor)  # before minutes are spent
     prepare_bank(config)
     play_on_one_thread()
     problem = open_problem(config)
-    seeds = range(arguments.seed, arguments.seed + arguments.drives)
     # The drive that an environment of such a seed begins with.
     drives = {f"drive_{seed}": drive_seed(seeding.np_random(seed)[0]) for seed in seeds}
     frames = len(drives) * (config.frames_per_drive + 1)
     with progress(frames, "recording", "frame") as bar:
-        write_drives(arguments.out, problem, drives, camera, tick=bar.update)
+        write_drives(out, problem, drives, camera, tick=bar.update)
     megahertz = " and ".join(f"{hz / 1e6:g}" for hz in kept)
-    print(f"{frames} frames at {megahertz} MHz, as {camera.name} stores them: {arguments.out}")
+    print(f"{frames} frames at {megahertz} MHz, as {camera.name} stores them: {out}")
     write_numbers(arguments, {"frames": frames, "drives": len(drives), "frequencies_hz": kept})
     return DONE
 

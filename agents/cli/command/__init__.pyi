@@ -9,6 +9,7 @@ from .command import (
     add_json as add_json,
     add_out as add_out,
     add_out_or_url as add_out_or_url,
+    add_place as add_place,
     add_sensor_and_merge as add_sensor_and_merge,
     add_trust as add_trust,
     execution_of as execution_of,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentTypeError
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -100,6 +101,20 @@ def add_out_or_url(parser: ArgumentParser, default: str, what: str) -> None:
         metavar="DIR",
         help=f"{what}; or the URL of a place, such as s3://bucket/study",
     )
+
+
+def add_place(parser: ArgumentParser, what: str, *, required: bool = False) -> None:
+    """`--to URL`."""
+    parser.add_argument("--to", type=_url, required=required, metavar="URL", help=what)
+
+
+def _url(text: str) -> str:
+    from unwrap.storage import is_url
+
+    if not is_url(text):
+        # `bank info` and others would take it for the folder of a bank.
+        raise ArgumentTypeError(f"{text} is no URL; expected one such as s3://bucket/bank")
+    return text
 
 
 def _path_or_url(text: str) -> Path | str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from jsonargparse import Namespace
 
 from shotenv.config import ConfigError
 
+SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/")
+"""What a path begins with that was made of a URL."""
 FILES, FOLDERS = ("json", "sheet", "mcap", "rrd"), ("out", "page")
 """Arguments that name what is written, in every command that has them."""
 
@@ -25,10 +28,12 @@ def check_outputs(arguments: Namespace, *, out_is_file: bool = False) -> None:
     Raises
     ------
     ConfigError
-        A folder where a file is wanted, a file where a folder is, or one within a file or a folder
-        that may not be written to; the message names argument and place.
+        A URL where a path is wanted, a folder where a file is, a file where a folder is, or one
+        within a file or a folder that may not be written to; the message names argument and place.
     """
     for name, path in _outputs(arguments):
+        if SCHEME.match(str(path)):
+            raise ConfigError(f"{name} is {path}, of a URL; expected a path of this machine")
         is_folder = name in FOLDERS and not (name == "out" and out_is_file)
         if is_folder and path.exists() and not path.is_dir():
             raise ConfigError(f"{name} is {path}, which is a file; expected a folder")
@@ -50,6 +55,6 @@ def _outputs(arguments: Namespace) -> Iterator[tuple[str, Path]]:
     """Name of each argument that names an output, and the path."""
     for name in (*FILES, *FOLDERS):
         path = arguments.get(name)
-        # What begins with a scheme is no path of this machine.
-        if path is not None and "://" not in str(path):
-            yield name, Path(path)
+        # A place is a str, see `add_out_or_url`.
+        if isinstance(path, Path):
+            yield name, path

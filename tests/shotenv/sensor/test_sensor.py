@@ -92,7 +92,7 @@ def test_one_sensor_serves_a_batch_of_frames(sensor):
     together = noise_free(three, sensor, offsets=offsets, batch=3).dcs_lsb
     assert torch.equal(together, torch.cat([alone] * 3))
     two = OffsetPattern(*(torch.cat([offsets.pattern_lsb] * 2) for _ in range(2)))
-    with pytest.raises(RuntimeError, match="expand"):
+    with pytest.raises(ValueError, match=r"pattern_lsb is \(2, 4, 5\); expected \(3, 4, 5\)"):
         noise_free(three, sensor, offsets=two, batch=3)
     with pytest.raises(RuntimeError, match="expand"):
         capture_gray(three.ambient, sensor, noise=torch.zeros_like(three.ambient[:2]))
