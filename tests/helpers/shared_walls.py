@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import torch
 from unwrap_source import Walls
@@ -63,10 +66,22 @@ def stopping_walls(split: str) -> SharedWalls:
     return walls(split)
 
 
+def raise_before_others(mark: Path) -> None:
+    """The second process raises and ends late; the first soon misses it, a third only waits."""
+    rank = os.environ["LOCAL_RANK"]
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    if rank == "1":
+        atexit.register(time.sleep, 3)
+        mark.touch()
+        raise ValueError("frame 7 is damaged")
+    while rank != "0" or not mark.exists():
+        time.sleep(0.1)
+    time.sleep(0.5)
+    raise ConnectionResetError("connection closed by peer")
+
+
 def train_two(out: str) -> None:
     """Train on two processes for long, for a test that interrupts this one."""
-    from pathlib import Path
-
     from unwrap.training import TrainConfig, train
 
     config = TrainConfig(width=4, epochs=10_000, batch_size=4)
