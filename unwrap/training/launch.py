@@ -10,6 +10,7 @@ import pickle
 import signal
 import socket
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import wait
 from pathlib import Path
@@ -151,23 +152,30 @@ def _require_sound(processes: ProcessContext, watches: Sequence[StoppedWatch], t
             pid = processes.pids()[rank]
             raise RuntimeError(f"process {rank} of {team.devices} hangs: {pid} was stopped")
     codes = {rank: one.exitcode for rank, one in enumerate(processes.processes) if one.exitcode}
-    if not codes:
-        return
-    # One that raises has written so before the others lose it, and may end later than they do.
-    told = {rank: Path(file) for rank, file in enumerate(processes.error_files)}
-    told = {rank: file for rank, file in told.items() if file.exists()}
+    # One that raises has written why before the others lose it, and may end later than they do.
+    raised = {rank: Path(file) for rank, file in enumerate(processes.error_files)}
+    raised = {rank: file for rank, file in raised.items() if _report(file)}
     report = ""
-    if silent := sorted(codes.keys() - told.keys()):
+    if silent := sorted(codes.keys() - raised.keys()):
         rank, code = silent[0], codes[silent[0]]
         said = f"it died ({signal.Signals(-code).name if code < 0 else f'exit code {code}'})"
-    else:
-        rank = min(told, key=lambda rank: told[rank].stat().st_mtime_ns)
-        report = pickle.loads(told[rank].read_bytes())
+    elif raised:
+        rank = min(raised, key=lambda rank: raised[rank].stat().st_mtime_ns)
+        report = _report(raised[rank])
         said = report.strip().splitlines()[-1]
+    else:
+        return
     hint = "; if it lost another machine, that one tells why" if team.nodes > 1 else ""
     failure = RuntimeError(f"process {rank} of {team.devices} failed: {said}{hint}")
     failure.add_note(report)
     raise failure
+
+
+def _report(file: Path) -> str:
+    """The traceback that a process has written; empty where it has not, or not all of it yet."""
+    with suppress(OSError, EOFError, pickle.UnpicklingError):
+        return str(pickle.loads(file.read_bytes()))
+    return ""
 
 
 def _serve(

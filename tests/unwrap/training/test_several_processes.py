@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -252,6 +253,53 @@ def test_a_process_that_dies_or_stops_is_named(source, message, tmp_path):
     with pytest.raises(RuntimeError, match=message):
         train(CONFIG, source, tmp_path, devices=2, progress=False)
     assert time.monotonic() - begun < 120
+
+
+@pytest.mark.slow
+def test_two_machines_train_what_one_process_does_though_one_was_lost(tmp_path):
+    """Each is a command of its own, as a user calls it; both go on from the last epoch."""
+    out, mark = tmp_path / "out", tmp_path / "lost"
+    first, second = nodes(out, mark)
+    try:
+        _, told = first.communicate(timeout=180)
+        # Seconds, though a busy machine takes its time; what hangs is given up after minutes.
+        assert first.returncode == 1 and time.time() - mark.stat().st_mtime < 30
+        assert "process 0 of 1 failed: " in told and "if it lost another machine" in told
+        assert second.wait(timeout=10) == -signal.SIGKILL
+        assert {path.name for path in out.iterdir()} == {"tensorboard", "tofregnet.ckpt"}
+        for node in nodes(out, mark):
+            _, told = node.communicate(timeout=180)
+            assert node.returncode == 0, told
+        train(CONFIG.model_copy(update={"epochs": 4}), precise_walls, tmp_path, progress=False)
+    finally:
+        torch.set_default_dtype(torch.float32)
+    expected = weights_of(tmp_path, "tofregnet")
+    for name, tensor in weights_of(out, "tofregnet").items():
+        torch.testing.assert_close(tensor, expected[name], atol=1e-7, rtol=1e-7)
+    assert (out / "tofregnet.json").read_text() == (tmp_path / "tofregnet.json").read_text()
+
+
+def nodes(out: Path, mark: Path) -> list[subprocess.Popen]:
+    """The commands of two machines, which are this one."""
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        port = listener.getsockname()[1]
+    return [
+        subprocess.Popen(
+            [sys.executable, shared_walls.__file__, str(out), str(mark)],
+            env={
+                **os.environ,
+                "PYTHONPATH": os.pathsep.join(sys.path),
+                "MASTER_ADDR": "127.0.0.1",
+                "MASTER_PORT": str(port),
+                "NODE_RANK": str(rank),
+            },
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        for rank in range(2)
+    ]
 
 
 @pytest.mark.slow
