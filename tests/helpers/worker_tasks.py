@@ -52,7 +52,7 @@ def unpicklable_at_three(number: int):
 def killed_while_it_sends(number: int) -> bytes:
     if number != 3:
         return b""
-    threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGKILL)).start()
+    threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGKILL)).start()
     return bytes(50_000_000)
 
 

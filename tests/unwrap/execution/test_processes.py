@@ -74,7 +74,7 @@ def test_a_worker_that_dies_while_it_sends_is_named():
         worker_tasks.killed_while_it_sends, [1, 3], workers=2, keep_going=True
     ):
         if not done:
-            time.sleep(2.0)
+            time.sleep(2.5)
         done[task] = result
     assert done[1] == b""
     assert isinstance(done[3], WorkerError) and "task 3 failed: its worker" in str(done[3])
