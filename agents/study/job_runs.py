@@ -96,7 +96,8 @@ def run_jobs(
     failed: list[str] = []
     with progress(len(jobs), "study", "job", done=len(jobs) - len(left)) as bar:
         try:
-            finished = run_tasks(
+            # With no name of its own: whatever leaves the loop ends the workers at once.
+            for task, error in run_tasks(
                 run_job,
                 order.tasks(),
                 executor=executor,
@@ -106,8 +107,7 @@ def run_jobs(
                 tasks_per_worker=JOBS_PER_WORKER,
                 name=lambda task: task.job.name,
                 keep_going=True,
-            )
-            for task, error in finished:
+            ):
                 if error is not None:
                     failed.append(str(error))
                     say(f"{error}; the others go on")  # Now, and not hours later.

@@ -176,7 +176,8 @@ def render_clips(jobs: Sequence[ClipJob], workers: int | None, executor: Executo
 
     longest = max(job.frames for job in jobs)
     with progress(sum(job.frames for job in jobs), "rendering", "frame") as bar:
-        done = run_tasks(
+        # With no name of its own: whatever leaves the loop ends the workers at once.
+        for job, _ in run_tasks(
             render_missing,
             jobs,
             executor=executor,
@@ -187,8 +188,7 @@ def render_clips(jobs: Sequence[ClipJob], workers: int | None, executor: Executo
             prepare=limit_threads,
             passing=(BankError, RendererError, StorageError, WorkerError),
             name=lambda job: f"clip {job.name}",
-        )
-        for job, _ in done:
+        ):
             bar.update(job.frames)
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import torch
 from unwrap_source import Walls
@@ -63,10 +66,51 @@ def stopping_walls(split: str) -> SharedWalls:
     return walls(split)
 
 
+def raise_before_others(mark: Path) -> None:
+    """The second process raises and ends late; the first soon misses it, a third only waits."""
+    rank = os.environ["LOCAL_RANK"]
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    if rank == "1":
+        atexit.register(time.sleep, 3)
+        mark.touch()
+        raise ValueError("frame 7 is damaged")
+    while rank != "0" or not mark.exists():
+        time.sleep(0.1)
+    time.sleep(0.5)
+    raise ConnectionResetError("connection closed by peer")
+
+
+class DyingNode:
+    """Frames of which the second of two machines has none in the third epoch: it is lost then."""
+
+    def __init__(self, mark: Path):
+        self.mark = mark
+
+    def __call__(self, split: str) -> SharedWalls:
+        """The frames of a split."""
+        source = precise_walls(split)
+        batch = source.batch
+
+        def until_then(numbers, *, draw, shots):
+            if draw == 3 and os.environ["NODE_RANK"] == "1":
+                self.mark.touch()
+                os.killpg(0, signal.SIGKILL)
+            return batch(numbers, draw=draw, shots=shots)
+
+        source.batch = until_then
+        return source
+
+
+def train_node(out: str, mark: str) -> None:
+    """What each of two machines is called with."""
+    from unwrap.training import TrainConfig, train
+
+    config = TrainConfig(width=4, epochs=3, batch_size=4)
+    train(config, DyingNode(Path(mark)), Path(out), nodes=2, progress=False)
+
+
 def train_two(out: str) -> None:
     """Train on two processes for long, for a test that interrupts this one."""
-    from pathlib import Path
-
     from unwrap.training import TrainConfig, train
 
     config = TrainConfig(width=4, epochs=10_000, batch_size=4)
@@ -74,4 +118,4 @@ def train_two(out: str) -> None:
 
 
 if __name__ == "__main__":
-    train_two(sys.argv[1])
+    train_node(*sys.argv[1:]) if "NODE_RANK" in os.environ else train_two(sys.argv[1])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -46,6 +47,32 @@ def stopped_at_three(number: int) -> int:
 
 def unpicklable_at_three(number: int):
     return number if number != 3 else lambda: number
+
+
+def killed_while_it_sends(number: int) -> bytes:
+    if number != 3:
+        return b""
+    threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGKILL)).start()
+    return bytes(50_000_000)
+
+
+class OneWayError(Exception):
+    """Pickled to its message alone, of which it cannot be made again."""
+
+    def __init__(self, number: int, reason: str):
+        super().__init__(f"{number}: {reason}")
+
+
+def unreadable_at_three(number: int):
+    return OneWayError(number, "broken") if number == 3 else number
+
+
+def stopped_once(mark: str) -> str:
+    """Is stopped at the first try, of which the file `mark` tells the second."""
+    if not Path(mark).exists():
+        Path(mark).touch()
+        os.kill(os.getpid(), signal.SIGSTOP)
+    return "through"
 
 
 _PREPARED: list[int] = []

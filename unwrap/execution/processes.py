@@ -120,8 +120,11 @@ class _Worker:
         """What has become of the task; where the process is dead, that."""
         try:
             return self.pipe.recv()
-        except (EOFError, ConnectionResetError):
+        # In the middle of a result that is larger than the pipe, it is another one than before it.
+        except (EOFError, OSError):
             return self._lost(self._death())
+        except Exception as error:  # a result that can be pickled, but not made again of that
+            return Outcome(None, Failure(f"failed: {type(error).__name__}: {error}"))
 
     def hung(self) -> Outcome | None:
         """The end of a process that has been stopped (SIGSTOP) for some seconds, None of others."""

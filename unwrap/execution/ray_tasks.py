@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import os
 import secrets
+import signal
 import socket
 import sys
+import time
 import uuid
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -20,10 +22,15 @@ from typing import Any
 
 from unwrap.execution.cores import available_cores
 from unwrap.execution.work import Done, Failure, Outcome, Work
+from unwrap.support import StoppedWatch, say
 
 ADDRESS = "RAY_ADDRESS"
 TRIES = 4
 """So often a task is begun whose machine or process dies."""
+CHECK_S = 1.0
+"""How often worker processes are looked at."""
+PROCESSES = Path("/proc")
+"""Those of this machine; elsewhere than on Linux the folder has none."""
 ANSWER_S = 5.0
 """A cluster answers within so long."""
 OWN_VARIABLES = "SHOTENV_"
@@ -70,15 +77,17 @@ def run_on_ray(
         workers = workers or sum(gpus) or max(1, sum(cores) // (threads or 1))
         # No more than the smallest machine has: a task that fits nowhere would wait for ever.
         threads = threads or max(1, min(min(cores), sum(cores) // workers))
+        surroundings = _surroundings(threads)
         remote = ray.remote(
             num_cpus=threads,
             num_gpus=1 if gpus else 0,
             max_retries=TRIES - 1,
             max_calls=tasks_per_worker,
-            name="shotenv",
+            name=surroundings.run,
         )(_by_value())
-        packed = ray.cloudpickle.dumps((work, _surroundings(threads)))
+        packed = ray.cloudpickle.dumps((work, surroundings))
         at_work: dict[Any, Any] = {}
+        stopped = _StoppedWorkers(surroundings.run)
 
         def hand_out() -> None:
             while len(at_work) < workers:
@@ -91,13 +100,48 @@ def run_on_ray(
                 hand_out()
                 if not at_work:
                     return
-                ready, _ = ray.wait(list(at_work), num_returns=1)
+                ready, _ = ray.wait(list(at_work), num_returns=1, timeout=CHECK_S)
+                stopped.end()
                 done = [Done(at_work.pop(one), _fetched(ray, one)) for one in ready]
                 hand_out()
                 yield from done
         finally:
             for one in at_work:
                 ray.cancel(one, force=True)
+
+
+class _StoppedWorkers:
+    """Worker processes of one run, on this machine, that a signal has stopped.
+
+    Ray waits for them without end; one that dies it replaces, and runs its task again.
+    """
+
+    def __init__(self, run: str):
+        # Ray calls a process by the task that it is at.
+        self._title = f"ray::{run}".encode()
+        self._watches: dict[int, StoppedWatch] = {}
+        self._next_s = 0.0
+
+    def end(self) -> None:
+        """Kill those that have been stopped for some seconds; looks once in a second."""
+        if time.monotonic() < self._next_s:
+            return
+        self._next_s = time.monotonic() + CHECK_S
+        busy = [
+            int(path.parent.name) for path in PROCESSES.glob("[0-9]*/cmdline") if self._is_own(path)
+        ]
+        self._watches = {pid: self._watches.get(pid) or StoppedWatch(pid) for pid in busy}
+        for pid, watch in self._watches.items():
+            if watch.hangs():
+                say(f"worker {pid} was stopped; its task begins again")
+                with suppress(OSError):
+                    os.kill(pid, signal.SIGKILL)
+
+    def _is_own(self, words: Path) -> bool:
+        try:
+            return words.read_bytes().startswith(self._title)
+        except OSError:  # It has ended.
+            return False
 
 
 def _fetched(ray: Any, reference: Any) -> Outcome:
@@ -140,7 +184,7 @@ def _first(error: Exception) -> str:
 
 def _surroundings(threads: int) -> Surroundings:
     own = {name: value for name, value in os.environ.items() if name.startswith(OWN_VARIABLES)}
-    return Surroundings(uuid.uuid4().hex, threads, str(Path.cwd()), own)
+    return Surroundings(f"shotenv-{uuid.uuid4().hex}", threads, str(Path.cwd()), own)
 
 
 def _held(ray: Any, resource: str) -> list[int]:

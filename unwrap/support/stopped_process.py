@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from pathlib import Path
@@ -15,14 +16,14 @@ class StoppedWatch:
 
     def __init__(self, pid: int | None):
         self._pid = pid
-        self._last_seen_s = time.monotonic()
+        self._since_s = math.inf
 
     def hangs(self) -> bool:
         """Whether the process has been stopped (SIGSTOP) for some seconds; ask every second."""
         now = time.monotonic()
-        if not _is_stopped(self._pid):
-            self._last_seen_s = now
-        return now - self._last_seen_s > STOPPED_LIMIT_S
+        # From when it was first seen so: whoever asks may have been stopped, too, or away.
+        self._since_s = min(self._since_s, now) if _is_stopped(self._pid) else math.inf
+        return now - self._since_s > STOPPED_LIMIT_S
 
 
 def _is_stopped(pid: int | None) -> bool:

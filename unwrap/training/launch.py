@@ -6,15 +6,19 @@ Lightning finds its place among them by the environment variables that launchers
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from multiprocessing.connection import wait
+from pathlib import Path
 from typing import Any
 
 import torch
 from torch import multiprocessing
-from torch.multiprocessing.spawn import ProcessException
+from torch.multiprocessing import ProcessContext
 
 from unwrap.support import StoppedWatch, end_with_parent
 
@@ -54,12 +58,16 @@ class Team:
         for name in ("devices", "nodes"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; expected at least 1")
-        started = int(os.environ.get("LOCAL_WORLD_SIZE", self.devices))
-        if started != self.devices:
-            raise ValueError(
-                f"devices is {self.devices}, but the launcher started {started} processes here "
-                "(LOCAL_WORLD_SIZE); expected the same number"
-            )
+        for variable, field, own in (
+            ("LOCAL_WORLD_SIZE", "devices", self.devices),
+            ("WORLD_SIZE", "devices times nodes", self.processes),
+        ):
+            started = os.environ.get(variable, own) if is_started() else own
+            if str(started) != str(own):
+                raise ValueError(
+                    f"{field} is {own}, but the launcher started {started} processes ({variable}); "
+                    "expected the same number"
+                )
         if self.alone:
             return
         if device.type == "cuda" and torch.cuda.device_count() < self.devices:
@@ -124,23 +132,50 @@ def run_team(team: Team, function: Callable[..., None], *arguments: Any) -> None
     )
     watches = [StoppedWatch(pid) for pid in processes.pids()]
     try:
-        while not processes.join(CHECK_S):
-            for rank, watch in enumerate(watches):
-                # The others wait for it, and would for minutes.
-                if watch.hangs():
-                    raise RuntimeError(
-                        f"process {rank} of {team.devices} hangs: {processes.pids()[rank]} was "
-                        "stopped"
-                    )
-    except ProcessException as error:
-        last = str(error).strip().splitlines()[-1]
-        failure = RuntimeError(f"process {error.error_index} of {team.devices} failed: {last}")
-        failure.add_note(str(error))
-        raise failure from None
+        while True:
+            alive = [process.sentinel for process in processes.processes if process.is_alive()]
+            _require_sound(processes, watches, team)
+            if not alive:
+                return
+            wait(alive, CHECK_S)
     finally:
         for process in processes.processes:
             process.kill()
             process.join()
+
+
+def _require_sound(processes: ProcessContext, watches: Sequence[StoppedWatch], team: Team) -> None:
+    """Raise RuntimeError for the process that failed first, or was stopped, if there is one."""
+    for rank, watch in enumerate(watches):
+        # The others wait for it, and would for minutes.
+        if watch.hangs():
+            pid = processes.pids()[rank]
+            raise RuntimeError(f"process {rank} of {team.devices} hangs: {pid} was stopped")
+    codes = {rank: one.exitcode for rank, one in enumerate(processes.processes) if one.exitcode}
+    # One that raises has written why before the others lose it, and may end later than they do.
+    raised = {rank: Path(file) for rank, file in enumerate(processes.error_files)}
+    raised = {rank: file for rank, file in raised.items() if _report(file)}
+    report = ""
+    if silent := sorted(codes.keys() - raised.keys()):
+        rank, code = silent[0], codes[silent[0]]
+        said = f"it died ({signal.Signals(-code).name if code < 0 else f'exit code {code}'})"
+    elif raised:
+        rank = min(raised, key=lambda rank: raised[rank].stat().st_mtime_ns)
+        report = _report(raised[rank])
+        said = report.strip().splitlines()[-1]
+    else:
+        return
+    hint = "; if it lost another machine, that one tells why" if team.nodes > 1 else ""
+    failure = RuntimeError(f"process {rank} of {team.devices} failed: {said}{hint}")
+    failure.add_note(report)
+    raise failure
+
+
+def _report(file: Path) -> str:
+    """The traceback that a process has written; empty where it has not, or not all of it yet."""
+    with suppress(OSError, EOFError, pickle.UnpicklingError):
+        return str(pickle.loads(file.read_bytes()))
+    return ""
 
 
 def _serve(

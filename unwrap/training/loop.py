@@ -20,6 +20,7 @@ from typing import Any
 import lightning
 from lightning.pytorch.callbacks import ModelCheckpoint, TQDMProgressBar
 from lightning.pytorch.loggers import TensorBoardLogger
+from lightning.pytorch.plugins.environments import LightningEnvironment, TorchElasticEnvironment
 from lightning.pytorch.strategies import DDPStrategy
 from torch import distributed
 
@@ -194,8 +195,17 @@ def _trainer(
         benchmark=training_device().type == "cuda",
         devices=team.devices,
         num_nodes=team.nodes,
+        plugins=_plugins(team),
         **({} if team.alone else _together()),
     )
+
+
+def _plugins(team: Team) -> list[Any]:
+    """Where a process finds its place, and batch normalisations that know of the others."""
+    # Inside a Slurm job Lightning would ask Slurm, which knows nothing of the processes started
+    # here and is refused even for one process where its options are others than Lightning's.
+    places = [] if TorchElasticEnvironment.detect() else [LightningEnvironment()]
+    return places if team.alone else [*places, PooledNorms()]
 
 
 def _together() -> dict[str, Any]:
@@ -204,7 +214,7 @@ def _together() -> dict[str, Any]:
     # batch: nothing has to be sent before each forward pass.
     strategy = DDPStrategy(broadcast_buffers=False, timeout=PATIENCE)
     # The batches are dealt already, see `EpochShuffle`.
-    return {"strategy": strategy, "plugins": [PooledNorms()], "use_distributed_sampler": False}
+    return {"strategy": strategy, "use_distributed_sampler": False}
 
 
 @contextmanager

@@ -191,6 +191,26 @@ def test_a_transfer_of_what_has_not_been_trained_is_refused(files, transferred):
         run_here([job], out)
 
 
+def test_what_goes_wrong_beside_the_workers_ends_them_at_once(files, monkeypatch):
+    """And not only when nobody looks at the error any more."""
+    ended = []
+
+    def tasks(function, given, **_):
+        try:
+            yield next(given), ValueError("frame 3 is damaged")
+        finally:
+            ended.append(True)
+
+    def full_disk(_):
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(job_runs, "run_tasks", tasks)
+    monkeypatch.setattr(job_runs, "say", full_disk)
+    with pytest.raises(OSError, match="no space left") as kept:
+        job_runs.run_jobs(jobs_of(plan_of(files)), files / "out")
+    assert ended and kept.tb is not None
+
+
 def test_a_study_is_played_kept_and_measured(files, monkeypatch):
     plan, out = plan_of(files), files / "out"
     jobs = jobs_of(plan)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from contextlib import nullcontext
 
 import pytest
 
@@ -154,3 +155,23 @@ def test_unwritable_cache_folder_is_named(config, tmp_path):
     blocker.write_text("")
     with pytest.raises(BankError, match="SHOTENV_CACHE"):
         build_bank(config, blocker / "bank")
+
+
+def test_what_goes_wrong_beside_the_workers_ends_them_at_once(config, tmp_path, monkeypatch):
+    ended = []
+
+    def tasks(function, given, **_):
+        try:
+            yield given[0], None
+        finally:
+            ended.append(True)
+
+    class Broken(nullcontext):
+        def update(self, _):
+            raise BrokenPipeError
+
+    monkeypatch.setattr(build_module, "run_tasks", tasks)
+    monkeypatch.setattr(build_module, "progress", lambda *_: Broken(Broken()))
+    with pytest.raises(BrokenPipeError) as kept:
+        build_module.render_clips(clip_jobs(config, tmp_path), None, "ray")
+    assert ended and kept.tb is not None

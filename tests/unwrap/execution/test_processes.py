@@ -19,7 +19,7 @@ from unwrap.execution.cores import available_cores
 from unwrap.execution.places import visible
 from unwrap.execution.tasks import run_tasks
 from unwrap.execution.work import WorkerError
-from unwrap.support import stopped_process
+from unwrap.support import StoppedWatch, stopped_process
 
 
 def test_tasks_come_back_with_their_results_from_replaced_workers():
@@ -53,6 +53,7 @@ def test_leaving_the_loop_ends_the_workers():
         (worker_tasks.killed_at_three, r"task 3 failed: its worker process \d+ died \(SIGKILL\)"),
         (worker_tasks.stopped_at_three, r"task 3 hangs: worker \d+ was stopped"),
         (worker_tasks.unpicklable_at_three, "task 3 failed: .*pickle"),
+        (worker_tasks.unreadable_at_three, "task 3 failed: TypeError: .*reason"),
     ],
 )
 def test_a_failing_task_is_named_within_ten_seconds(function, message, monkeypatch):
@@ -64,6 +65,39 @@ def test_a_failing_task_is_named_within_ten_seconds(function, message, monkeypat
         next(results)
     assert time.monotonic() - start < 10
     assert not multiprocessing.active_children()
+
+
+def test_a_worker_that_dies_while_it_sends_is_named():
+    """Its result is larger than the pipe, and nobody takes it for a while."""
+    done = {}
+    for task, result in run_tasks(
+        worker_tasks.killed_while_it_sends, [1, 3], workers=2, keep_going=True
+    ):
+        if not done:
+            time.sleep(2.5)
+        done[task] = result
+    assert done[1] == b""
+    assert isinstance(done[3], WorkerError) and "task 3 failed: its worker" in str(done[3])
+
+
+def test_a_process_hangs_only_after_it_was_seen_stopped_for_long(monkeypatch):
+    """Not where who looks was away, stopped by Ctrl-Z for example, until just now."""
+    monkeypatch.setattr(stopped_process, "STOPPED_LIMIT_S", 0.3)
+    sleeper = subprocess.Popen(["sleep", "60"])
+    try:
+        watch = StoppedWatch(sleeper.pid)
+        assert not watch.hangs()
+        time.sleep(0.4)
+        sleeper.send_signal(signal.SIGSTOP)
+        wait_until(lambda: stopped_process._is_stopped(sleeper.pid))
+        assert not watch.hangs()
+        time.sleep(0.4)
+        assert watch.hangs()
+        sleeper.send_signal(signal.SIGCONT)
+        assert not watch.hangs()
+    finally:
+        sleeper.kill()
+        sleeper.wait()
 
 
 @pytest.mark.parametrize("name", ["workers", "threads", "tasks_per_worker"])

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -66,6 +68,16 @@ def test_a_raising_task_is_named_and_the_others_go_on_where_that_is_asked_for():
 def test_a_task_whose_worker_dies_runs_again(tmp_path):
     marks = [str(tmp_path / name) for name in ("one", "two")]
     assert dict(on_ray(worker_tasks.killed_once, marks)) == dict.fromkeys(marks, "through")
+
+
+@pytest.mark.slow
+def test_a_stopped_worker_is_named_within_ten_seconds_and_its_task_runs_again(tmp_path, capsys):
+    mark = tmp_path / "mark"
+    assert dict(on_ray(worker_tasks.stopped_once, [str(mark)])) == {str(mark): "through"}
+    assert re.search(
+        r"^worker \d+ was stopped; its task begins again$", capsys.readouterr().err, re.M
+    )
+    assert time.time() - mark.stat().st_mtime < 10
 
 
 def test_a_task_whose_worker_always_dies_is_named(monkeypatch):

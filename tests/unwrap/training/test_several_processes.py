@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -11,18 +12,26 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
 import psutil
 import pytest
 import shared_walls
 import torch
-from shared_walls import FRAMES, deadly_walls, precise_walls, stopping_walls, walls
+from shared_walls import (
+    FRAMES,
+    deadly_walls,
+    precise_walls,
+    raise_before_others,
+    stopping_walls,
+    walls,
+)
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from unwrap.networks.registry import NetworkName
 from unwrap.signal.shots import Shots
 from unwrap.training.config import TrainConfig
 from unwrap.training.data import EpochShuffle
-from unwrap.training.launch import Team, is_first_process
+from unwrap.training.launch import Team, is_first_process, run_team
 from unwrap.training.loop import train
 from unwrap.training.module import TrainingModule
 from unwrap.training.ranks import Ranks, Share
@@ -113,13 +122,68 @@ def test_what_cannot_be_shared_is_refused(team, batch_size, message):
 
 
 def test_processes_that_a_launcher_started_are_counted(monkeypatch):
+    monkeypatch.setenv("LOCAL_RANK", "0")
     monkeypatch.setenv("LOCAL_WORLD_SIZE", "2")
+    monkeypatch.setenv("WORLD_SIZE", "4")
     with pytest.raises(ValueError, match="devices is 1, but the launcher started 2 processes"):
         Team(1).check(4, 8, CPU)
-    Team(2).check(4, 8, CPU)
+    # Each machine would train by itself, into the same folder.
+    with pytest.raises(ValueError, match="devices times nodes is 2, but the launcher started 4"):
+        Team(2).check(4, 8, CPU)
+    Team(2, 2).check(4, 8, CPU)
     assert is_first_process()
     monkeypatch.setenv("LOCAL_RANK", "1")
     assert not is_first_process()
+
+
+@pytest.mark.parametrize("network", ["tofregnet", "phasenet"])
+def test_one_process_trains_what_a_plain_loop_does(network, tmp_path, monkeypatch):
+    """To the bit, also inside a Slurm job that is not Lightning's."""
+    monkeypatch.setenv("SLURM_NTASKS", "4")
+    monkeypatch.setenv("SLURM_JOB_NAME", "network")
+    config = CONFIG.model_copy(update={"network": network, "clip_norm": 1.0})
+    train(config, walls, tmp_path, progress=False)
+    trained = weights_of(tmp_path, network)
+    expected = {f"network.{name}": tensor for name, tensor in plainly_trained(config).items()}
+    assert trained.keys() == expected.keys()
+    for name, tensor in expected.items():
+        assert torch.equal(trained[name], tensor), name
+
+
+def plainly_trained(config: TrainConfig) -> dict[str, torch.Tensor]:
+    """State of a network after a loop of torch's alone."""
+    source, network = walls("train"), config.build().train().to(memory_format=torch.channels_last)
+    order = EpochShuffle(len(source), config.batch_size, config.shown_shots, config.seed)
+    steps = config.epochs * len(order)
+    optimizer = torch.optim.AdamW(
+        network.parameters(), weight_decay=config.weight_decay, fused=True
+    )
+    rise = int(config.warmup_share * steps)
+    final = config.final_learning_rate / config.learning_rate
+    step = 0
+    for epoch in range(config.epochs):
+        order.set_epoch(epoch)
+        for one in order:
+            share = 1 + (final - 1) * (step - rise) / (steps - rise)
+            share = (step + 1) / (rise + 1) if step < rise else share
+            optimizer.param_groups[0]["lr"] = config.learning_rate * share
+            batch = source.batch(one.numbers, draw=one.draw, shots=one.shots)
+            sensed, truth = config.augmentation(*batch, generator=seeded(config.seed, 1, step))
+            draw = Share(len(sensed)).draw(seeded(config.seed, 2, step))
+            sensed = network.as_trained_on(sensed, draw)
+            output = network(network.features(sensed, source.sensor))
+            loss = network.loss(output, sensed, truth, source.sensor, config.loss_weights)
+            optimizer.zero_grad()
+            loss.backward()
+            torch.nn.utils.clip_grad_norm_(network.parameters(), config.clip_norm)
+            optimizer.step()
+            step += 1
+    return network.state_dict()
+
+
+def seeded(*words: int) -> torch.Generator:
+    seed = np.random.SeedSequence(words).generate_state(1, np.uint64)[0] >> 1
+    return torch.Generator().manual_seed(int(seed))
 
 
 def curve(out: Path, network: str) -> tuple[list[float], list[float]]:
@@ -189,6 +253,62 @@ def test_a_process_that_dies_or_stops_is_named(source, message, tmp_path):
     with pytest.raises(RuntimeError, match=message):
         train(CONFIG, source, tmp_path, devices=2, progress=False)
     assert time.monotonic() - begun < 120
+
+
+@pytest.mark.slow
+def test_two_machines_train_what_one_process_does_until_one_is_lost(tmp_path):
+    """Each is a command of its own, as a user calls it; one process goes on from the last epoch."""
+    part, mark = tmp_path / "part", tmp_path / "lost"
+    first, second = nodes(part, mark)
+    _, told = first.communicate(timeout=180)
+    # Seconds, though a busy machine takes its time; what hangs is given up after minutes.
+    assert first.returncode == 1 and time.time() - mark.stat().st_mtime < 30
+    assert "process 0 of 1 failed: " in told and "if it lost another machine" in told
+    second.communicate(timeout=10)
+    assert second.returncode == -signal.SIGKILL
+    assert {path.name for path in part.iterdir()} == {"tensorboard", "tofregnet.ckpt"}
+    try:
+        train(CONFIG, precise_walls, tmp_path / "whole", progress=False)
+        train(CONFIG, precise_walls, part, progress=False)
+    finally:
+        torch.set_default_dtype(torch.float32)
+    expected = weights_of(tmp_path / "whole", "tofregnet")
+    for name, tensor in weights_of(part, "tofregnet").items():
+        torch.testing.assert_close(tensor, expected[name], atol=1e-7, rtol=1e-7)
+    both = [(folder / "tofregnet.json").read_text() for folder in (part, tmp_path / "whole")]
+    assert both[0] == both[1]
+
+
+def nodes(out: Path, mark: Path) -> list[subprocess.Popen]:
+    """The commands of two machines, which are this one."""
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        port = listener.getsockname()[1]
+    return [
+        subprocess.Popen(
+            [sys.executable, shared_walls.__file__, str(out), str(mark)],
+            env={
+                **os.environ,
+                "PYTHONPATH": os.pathsep.join(sys.path),
+                "MASTER_ADDR": "127.0.0.1",
+                "MASTER_PORT": str(port),
+                "NODE_RANK": str(rank),
+            },
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        for rank in range(2)
+    ]
+
+
+@pytest.mark.slow
+def test_what_raised_first_is_told_also_where_others_end_sooner(tmp_path):
+    """And at once, though one is deaf to requests to end."""
+    mark = tmp_path / "raised"
+    with pytest.raises(RuntimeError, match="process 1 of 3 failed: ValueError: frame 7 is damaged"):
+        run_team(Team(3), raise_before_others, mark)
+    assert time.time() - mark.stat().st_mtime < 10
 
 
 @pytest.mark.slow
