@@ -18,7 +18,7 @@ import numpy as np
 
 from unwrap.cameras.files.camera_description import CameraDescription
 from unwrap.cameras.files.stored_frames import StoredFrames, numbered
-from unwrap.support import in_one_line
+from unwrap.support import in_one_line, open_regular
 
 WIRE_HEADER = struct.Struct("!BHHHHHHHHHHhH")
 CELSIUS_K = 273.15
@@ -50,7 +50,7 @@ class WireFrames:
     def _walk(self) -> tuple[tuple[_Image, ...], tuple[int, int]]:
         """All images, and their rows and columns; headers alone are read."""
         try:
-            with self.path.open("rb") as file:
+            with open_regular(self.path) as file:
                 images: list[_Image] = []
                 size, end = None, self.path.stat().st_size
                 while file.tell() < end:

@@ -1,5 +1,6 @@
 """Recordings that are damaged, or not as described: a sentence that names file and frame."""
 
+import os
 import sys
 
 import h5py
@@ -50,6 +51,11 @@ def arducam(tmp_path):
 def packed(tmp_path):
     write_raw12(tmp_path / "a.raw", whole(planes("arducam_b0548", WALLS, [90e6, 15e6])))
     return tmp_path / "a.raw"
+
+
+def test_a_named_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "log.bin")
+    assert "not a regular file" in refused(tmp_path / "log.bin", "epc660_wire")
 
 
 @pytest.mark.parametrize("bytes_more", [-1, -100, 1, 12])
