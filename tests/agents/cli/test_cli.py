@@ -43,7 +43,10 @@ def test_every_command_explains_itself(capsys, command):
     assert status == 0 and f"shotenv {command.words}" in out
 
 
-RESUMING = {"demo", "train", "study", "render", "bank publish", "unwrap train", "unwrap table"}
+RESUMING = {"demo", "train", "study", "render", "bank publish", "fetch"} | {
+    "unwrap train",
+    "unwrap table",
+}
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.words)

@@ -256,8 +256,8 @@ class StoreMachine(RuleBasedStateMachine):
         if self.is_rendered:
             assert verify(self.bank) == ()
         if self.is_published:
-            damaged = [self.place / file.object_name for file in verify_published(self.url)]
-            assert damaged == ([but] if but else [])
+            damaged = {self.place / file.object_name for file in verify_published(self.url)}
+            assert damaged == ({but} if but else set())
         if self.place.exists():
             for path in (self.place / "objects").glob("[0-9a-f]*"):
                 assert path == but or sha256_of(path) == path.name
