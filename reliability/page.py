@@ -111,7 +111,7 @@ PROMISES = {
         (
             "tests/unwrap/execution/test_processes.py",
             "tests/agents/study/test_study.py",
-            "tests/unwrap/support/test_parent_process.py",
+            "tests/unwrap/support/test_workers.py",
         ),
     ),
     11: Promise(

@@ -23,6 +23,7 @@ from unwrap.support import (
     check_range,
     read_json,
     read_regular,
+    tensor_bytes,
     write_bytes,
     write_json,
 )
@@ -135,14 +136,8 @@ def write_scheduler(folder: Path, module: nn.Module, description: Description) -
 
     The description has a digest of both, by which parts of two schedulers are told apart.
     """
-    from safetensors.torch import save
-
-    # safetensors refuses tensors that do not lie in one piece.
-    tensors = {name: value.contiguous() for name, value in module.state_dict().items()}
-    weights, content = (
-        save(tensors),
-        {"schema": AGENT_SCHEMA, **description.model_dump(mode="json")},
-    )
+    weights = tensor_bytes(module.state_dict())
+    content = {"schema": AGENT_SCHEMA, **description.model_dump(mode="json")}
     # The description comes last: a folder that has it has the weights, too.
     write_bytes(folder / WEIGHTS, weights)
     write_json(folder / DESCRIPTION, {**content, "digest": _digest_of(content, weights)})

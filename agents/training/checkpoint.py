@@ -13,12 +13,11 @@ import numpy as np
 import torch
 from pydantic import Field, TypeAdapter
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
 
 from agents.config import AgentConfig
 from agents.policies import Provenance, Scheduler, first_line
 from shotenv.config import EnvConfig
-from unwrap.support import require_regular, write_bytes
+from unwrap.support import require_regular, tensor_bytes, write_bytes
 
 # One file, replaced whole: network, optimiser and progress of the same round, or none of them.
 CHECKPOINT: Final = "checkpoint.safetensors"
@@ -97,7 +96,7 @@ class Checkpoint:
     def save(self, tensors: dict[str, torch.Tensor], state: TrainingState) -> None:
         """Replace the file."""
         words = {"schema": SCHEMA, "identity": self._identity, "progress": json.dumps(vars(state))}
-        write_bytes(self.path, save(tensors, words))
+        write_bytes(self.path, tensor_bytes(tensors, words))
 
     def load(self, restore: Callable[[dict[str, torch.Tensor]], Any]) -> TrainingState:
         """Hand the tensors to `restore`; a new run's state where there is no file.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from shotenv.bank import (
     BankError,
@@ -48,7 +49,8 @@ def import_bank(
     sensor_path : Path
         Configuration of the sensor that the camera counts as.
     out : Path
-        Folder of the bank; must not exist yet, or be empty.
+        Folder of the bank; must not exist yet, or be empty. Where the same import has ended already
+        (in a command that was killed at its very end, say), what stands there is left as it is.
     truth : "external", "own" or "none", optional
         What distances are scored against. None is external where references are named, else own
         with eight samples, else none.
@@ -57,14 +59,17 @@ def import_bank(
     ------
     ValueError
         A recording is damaged, lacks something, or is not like the others; the message names file
-        and frame, and nothing is written.
+        and frame, and nothing is written. Or `out` has anything else than this bank.
     """
-    if out.is_dir() and any(out.iterdir()):
-        raise BankError(f"{out} is not empty; choose another folder, or delete it")
+    standing = contents_standing_in(out)
     config, sensor = read_recordings(folder), read_config(SensorConfig, sensor_path)
     rows = rows_of(config, folder, camera)
     shape = shape_of(opened(rows[0], folder, camera), sensor)
     level = level_of(truth, rows, shape.samples)
+    if standing is not None:  # What can be told before the work is.
+        found = (standing.name, standing.camera, standing.sensor, standing.truth)
+        require_same(found, (config.name, camera.name, sensor, level), out)
+        require_same(len(standing.clips), len(rows), out)
     temporary = unfinished(out.resolve())
     try:
         temporary.mkdir(parents=True)
@@ -79,10 +84,12 @@ def import_bank(
                 bar.update()
         assert rate_hz is not None  # There is a recording.
         contents = contents_of(config.name, clips, shape, level, rate_hz)
-        write_recorded_contents(temporary, contents)
-        write_environment(temporary, out, sensor_path, contents)
-        out.parent.mkdir(parents=True, exist_ok=True)
-        temporary.replace(out)
+        if standing is None:
+            write_recorded_contents(temporary, contents)
+            write_environment(temporary, out, sensor_path, contents)
+            temporary.replace(out)
+        else:
+            require_same(standing, contents, out)
     except OSError as error:
         raise BankError(
             f"cannot write {out}: {error.strerror or error}; choose another folder"
@@ -90,6 +97,28 @@ def import_bank(
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
     return RecordedBank(out)
+
+
+def contents_standing_in(out: Path) -> RecordedContents | None:
+    """Table of contents of the bank that `out` holds; None where the folder is free.
+
+    Raises
+    ------
+    BankError
+        There is something else.
+    """
+    if not out.is_dir() or not any(out.iterdir()):
+        return None
+    try:
+        return RecordedBank(out).manifest
+    except (BankError, OSError):
+        raise BankError(f"{out} is not empty; choose another folder, or delete it") from None
+
+
+def require_same(standing: Any, made: Any, out: Path) -> None:
+    """Raise `BankError` unless what is told of the bank in `out` is so of the one to be made."""
+    if standing != made:
+        raise BankError(f"{out} holds another bank; choose another folder, or delete it")
 
 
 def rows_of(

@@ -15,13 +15,12 @@ from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
 from torch import Tensor, nn
 
 from unwrap.networks.network import Network, Settings
 from unwrap.networks.registry import build_network
 from unwrap.networks.sizes import trained_size
-from unwrap.support import in_one_line, require_regular, write_bytes
+from unwrap.support import in_one_line, require_regular, tensor_bytes, write_bytes
 
 SCHEMA = "1"
 """Version of the metadata."""
@@ -66,29 +65,16 @@ class WeightsLabel:
 
 def save_weights(path: Path, network: nn.Module, metadata: Mapping[str, Any]) -> None:
     """Write the weights of `network` and `metadata` (plain JSON values) to `path`."""
-    tensors = {}
-    for name, tensor in network.state_dict().items():
-        stored = tensor.detach().cpu().to(_stored_type(tensor))
-        tensors[name] = stored.contiguous()
+    tensors = {
+        name: tensor.detach().cpu().to(_stored_type(tensor))
+        for name, tensor in network.state_dict().items()
+    }
     values = {"schema": SCHEMA, "sha256": fingerprint(tensors), **metadata}
     # The metadata of a safetensors file is text alone.
     words = {
         key: value if isinstance(value, str) else json.dumps(value) for key, value in values.items()
     }
-    write_bytes(path, _in_order(save(tensors, words)))
-
-
-def _in_order(content: bytes) -> bytes:
-    """The same file with its words by their names: equal networks are equal files.
-
-    safetensors leaves their order to chance.
-    """
-    end = 8 + int.from_bytes(content[:8], "little")
-    header = json.loads(content[8:end])
-    header["__metadata__"] = dict(sorted(header["__metadata__"].items()))
-    told = json.dumps(header, separators=(",", ":"), ensure_ascii=False).encode()
-    told += b" " * (-len(told) % 8)
-    return len(told).to_bytes(8, "little") + told + content[end:]
+    write_bytes(path, tensor_bytes(tensors, words))
 
 
 def _stored_type(tensor: Tensor) -> torch.dtype:

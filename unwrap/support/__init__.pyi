@@ -25,7 +25,6 @@ from .files import (
     write_text as write_text,
 )
 from .npy_header import NpyHeader as NpyHeader, read_npy_header as read_npy_header
-from .parent_process import end_with_parent as end_with_parent
 from .process_state import (
     keep_freed_memory as keep_freed_memory,
     torch_threads as torch_threads,
@@ -39,7 +38,7 @@ from .section import (
     Section as Section,
     check_range as check_range,
 )
-from .stopped_process import StoppedWatch as StoppedWatch
+from .tensor_files import tensor_bytes as tensor_bytes
 from .tensors import (
     concatenate as concatenate,
     mapped as mapped,
@@ -54,3 +53,4 @@ from .whole_files import (
     read_regular as read_regular,
     require_regular as require_regular,
 )
+from .workers import StoppedWatch as StoppedWatch, end_with_parent as end_with_parent

@@ -168,6 +168,31 @@ def test_nothing_is_written_over(folder, take_in, tmp_path):
     assert (tmp_path / "note.txt").read_text() == "mine"
 
 
+def test_an_import_that_has_ended_already_leaves_what_stands(folder, take_in, tmp_path):
+    out = tmp_path / "bank"
+    first = take_in(folder, out)
+    (out / "env.yaml").write_text("changed")
+    before = {path: path.stat().st_mtime_ns for path in out.rglob("*")}
+    assert take_in(folder, out).fingerprint == first.fingerprint
+    assert {path: path.stat().st_mtime_ns for path in out.rglob("*")} == before
+    assert list(tmp_path.iterdir()) == [out]
+
+
+def test_an_import_of_other_recordings_is_refused(folder, take_in, tmp_path, monkeypatch):
+    out = tmp_path / "bank"
+    take_in(folder, out)
+    shutil.copytree(folder, tmp_path / "in")
+    truth = np.load(tmp_path / "in" / "drive_0_truth.npy")
+    np.save(tmp_path / "in" / "drive_0_truth.npy", truth + np.float32(0.25))
+    with pytest.raises(ValueError, match="bank holds another bank; choose another folder, or"):
+        take_in(tmp_path / "in", out)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bank", "in"]
+    # What can be told without the work is told before it.
+    monkeypatch.setattr("shotenv.recorded.bank_import.take_in", None)
+    with pytest.raises(ValueError, match="holds another bank"):
+        take_in(folder, out, truth="own")
+
+
 def test_a_sensor_of_other_frequencies_is_refused(folder, take_in, tmp_path):
     with pytest.raises(ValueError, match="are 24 and 10 MHz, and those of sensor mlx75027 60 and"):
         take_in(folder, tmp_path / "out", sensor="mlx75027")

@@ -19,7 +19,7 @@ from unwrap.execution.cores import available_cores
 from unwrap.execution.places import visible
 from unwrap.execution.tasks import run_tasks
 from unwrap.execution.work import WorkerError
-from unwrap.support import StoppedWatch, stopped_process
+from unwrap.support import StoppedWatch, workers
 
 
 def test_tasks_come_back_with_their_results_from_replaced_workers():
@@ -57,7 +57,7 @@ def test_leaving_the_loop_ends_the_workers():
     ],
 )
 def test_a_failing_task_is_named_within_ten_seconds(function, message, monkeypatch):
-    monkeypatch.setattr(stopped_process, "STOPPED_LIMIT_S", 1.0)
+    monkeypatch.setattr(workers, "STOPPED_LIMIT_S", 1.0)
     results = run_tasks(function, [1, 3], workers=1)
     assert next(results) == (1, 1)
     start = time.monotonic()
@@ -67,29 +67,31 @@ def test_a_failing_task_is_named_within_ten_seconds(function, message, monkeypat
     assert not multiprocessing.active_children()
 
 
-def test_a_worker_that_dies_while_it_sends_is_named():
-    """Its result is larger than the pipe, and nobody takes it for a while."""
-    done = {}
-    for task, result in run_tasks(
-        worker_tasks.killed_while_it_sends, [1, 3], workers=2, keep_going=True
-    ):
-        if not done:
-            time.sleep(2.5)
-        done[task] = result
-    assert done[1] == b""
-    assert isinstance(done[3], WorkerError) and "task 3 failed: its worker" in str(done[3])
+def test_a_worker_that_dies_while_it_sends_is_named(tmp_path):
+    """Its result is larger than the pipe, and nobody takes it before it is dead."""
+    first, killed = tmp_path / "first", tmp_path / "killed"
+    results = run_tasks(
+        worker_tasks.killed_while_it_sends, [first, killed], workers=2, keep_going=True
+    )
+    assert next(results) == (first, b"")
+    killed.with_suffix(".go").touch()
+    wait_until(lambda: killed.exists() and killed.read_text())
+    wait_until(lambda: not is_alive(int(killed.read_text())))
+    task, error = next(results)
+    assert isinstance(error, WorkerError) and f"{task!r} failed: its worker" in str(error)
+    assert next(results, None) is None
 
 
 def test_a_process_hangs_only_after_it_was_seen_stopped_for_long(monkeypatch):
     """Not where who looks was away, stopped by Ctrl-Z for example, until just now."""
-    monkeypatch.setattr(stopped_process, "STOPPED_LIMIT_S", 0.3)
+    monkeypatch.setattr(workers, "STOPPED_LIMIT_S", 0.3)
     sleeper = subprocess.Popen(["sleep", "60"])
     try:
         watch = StoppedWatch(sleeper.pid)
         assert not watch.hangs()
         time.sleep(0.4)
         sleeper.send_signal(signal.SIGSTOP)
-        wait_until(lambda: stopped_process._is_stopped(sleeper.pid))
+        wait_until(lambda: workers._is_stopped(sleeper.pid))
         assert not watch.hangs()
         time.sleep(0.4)
         assert watch.hangs()

@@ -1,9 +1,12 @@
-"""Workers that a signal has stopped: they keep silent, and would be waited for without end."""
+"""Workers and those who started them: neither goes on for one that is gone or has stopped."""
 
 from __future__ import annotations
 
 import math
+import multiprocessing
+import os
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -11,8 +14,27 @@ STOPPED_LIMIT_S = 5.0
 """After this long a stopped process counts as hung."""
 
 
+def end_with_parent() -> None:
+    """Let this process, which another one started as a worker, end as soon as that one has.
+
+    However that one ends: nobody else would tell a worker, which would go on computing what nobody
+    waits for.
+    """
+    threading.Thread(target=_end_after_parent, daemon=True).start()
+
+
+def _end_after_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
 class StoppedWatch:
-    """Looks at a process now and then, and says whether it hangs."""
+    """Looks at a worker now and then, and says whether it hangs.
+
+    One that a signal has stopped keeps silent, and would be waited for without end.
+    """
 
     def __init__(self, pid: int | None):
         self._pid = pid
