@@ -1,19 +1,21 @@
 """Work whose files go to a place: done in a folder of its own machine, then published whole.
 
 parts/<label>/<name>.json               a job or a training that is done, see `unwrap.storage`
-unfinished/<label>/<name>-<digest>.zip  what a training has come to, by what it depends on
+unfinished/<label>/<name>-<digest>.zip  what a training has come to, by what it depends on, until
+                                        it is done
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import re
 import tempfile
 import threading
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -68,11 +70,24 @@ class Shelf(NamedTuple):
         return listing
 
     def publish(self, name: str, folder: Path, wanted: Callable[[str], bool]) -> Listing:
-        """Publish those files in `folder` that are wanted, `name`.json last where there is one."""
+        """Publish those files in `folder` that are wanted, `name`.json last where there is one.
+
+        Then what the work had come to before its end is deleted.
+        """
         paths = (path for path in folder.rglob("*") if path.is_file())
         names = [path.relative_to(folder).as_posix() for path in paths]
         own = sorted(filter(wanted, names), key=lambda path: (path == f"{name}.json", path))
-        return publish_part(self.place, self.label, name, folder, own)
+        place = self.place
+        listing = publish_part(place, self.label, name, folder, own)
+        archives = re.compile(re.escape(self._unfinished(name)) + r"-[0-9a-f]{16}\.zip")
+        with suppress(StorageError):  # What is published, is; this only takes room.
+            for there in place.sizes(self._unfinished(name).rpartition("/")[0]):
+                if archives.fullmatch(there):
+                    place.discard(there)
+        return listing
+
+    def _unfinished(self, name: str) -> str:
+        return f"unfinished/{self.label}/{name}"
 
     @contextmanager
     def resumed(self, name: str, depends_on: Mapping[str, Any], folder: Path) -> Iterator[None]:
@@ -81,11 +96,10 @@ class Shelf(NamedTuple):
         A place that cannot be written meanwhile ends no training.
         """
         known = json.dumps(depends_on, sort_keys=True).encode()
-        there = f"unfinished/{self.label}/{name}-{hashlib.sha256(known).hexdigest()[:16]}.zip"
+        there = f"{self._unfinished(name)}-{hashlib.sha256(known).hexdigest()[:16]}.zip"
         with tempfile.TemporaryDirectory() as scratch:
             archive, ended = Path(scratch) / "unfinished.zip", threading.Event()
             self._unpack(there, archive, folder)
-
             begun = _changed_at(folder)
 
             def keep() -> None:

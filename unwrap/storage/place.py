@@ -157,7 +157,10 @@ class Place:
             self.write(name, b"")
         except StorageError as error:
             raise StorageError(str(error).replace(f"/{name}", "")) from None
-        # Some may write, but not delete; an empty file does no harm.
+        self.discard(name)
+
+    def discard(self, name: str) -> None:
+        """Delete a file that nobody needs any more; some may write, but not delete: it stays."""
         with suppress(Exception):
             self._files.rm_file(self._path(name))
 

@@ -167,10 +167,11 @@ def test_results_of_another_configuration_are_refused_and_kept(files, url):
     assert standing_parts(Place(url), "study") == before
 
 
-def wait_for(place: Place, folder: str) -> str:
+def wait_for(place: Place, folder: str, name: str = "") -> str:
     for _ in range(500):
-        if found := place.sizes(folder):
-            return next(iter(found))
+        for found in place.sizes(folder):
+            if found.rpartition("-")[0].endswith(name):
+                return found
         time.sleep(0.01)
     raise AssertionError(f"nothing in {folder}")
 
@@ -214,6 +215,21 @@ def test_a_training_is_kept_and_resumed(tmp_path, url, monkeypatch):
     with pytest.raises(StorageError, match=odd), shelf.resumed("a/b-0", told, other):
         pass
     assert not (tmp_path / "outside").exists() and list(other.iterdir()) == []
+
+
+def test_what_is_done_leaves_nothing_unfinished_but_others_work(tmp_path, url, monkeypatch):
+    monkeypatch.setattr(published_work, "KEPT_EVERY_S", 0.02)
+    shelf, place = Shelf(url, "study"), Place(url)
+    for name in ("a/b-0", "a/b-0-1", "a/b-00"):
+        folder = tmp_path / name
+        with shelf.resumed(name, {}, folder):
+            folder.mkdir(parents=True)
+            (folder / "checkpoint.safetensors").write_text(name)
+            wait_for(place, "unfinished", name)
+    (tmp_path / "a" / "b-0.json").write_text("{}")
+    shelf.publish("a/b-0", tmp_path, lambda path: path.startswith(("a/b-0/", "a/b-0.")))
+    left = sorted(name.rpartition("-")[0] for name in place.sizes("unfinished"))
+    assert left == ["unfinished/study/a/b-0-1", "unfinished/study/a/b-00"]
 
 
 def test_a_place_that_fails_meanwhile_ends_no_training(tmp_path, monkeypatch, capsys):
