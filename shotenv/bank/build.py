@@ -8,8 +8,6 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from filelock import FileLock
-
 from shotenv.bank.clip_jobs import ClipJob, clip_jobs
 from shotenv.bank.files import (
     CLIPS,
@@ -17,6 +15,7 @@ from shotenv.bank.files import (
     SOURCE,
     BankError,
     ClipRecord,
+    alone_in,
     bank_folder,
     frame_bytes,
     identity,
@@ -95,7 +94,7 @@ def build_bank(
             f"cannot create {folder}: {error.strerror}; choose another cache folder "
             "with SHOTENV_CACHE"
         ) from None
-    with FileLock(folder / ".lock"):
+    with alone_in(folder):
         _claim(folder, config)
         # Only now, under the lock: another process may have rendered them meanwhile.
         missing = [job for job in jobs if read_clip_record(job.folder) is None]

@@ -11,7 +11,6 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-from filelock import FileLock
 from tqdm import tqdm
 
 from shotenv.bank.bank import Bank
@@ -29,6 +28,7 @@ from shotenv.bank.files import (
     Manifest,
     RecordedClip,
     TableOfContents,
+    alone_in,
     bank_folder,
     fetched_banks,
     identity,
@@ -244,7 +244,7 @@ def fetch_bank(url: str) -> Path:
     if (folder / table).is_file():
         return folder
     folder.mkdir(parents=True, exist_ok=True)
-    with FileLock(folder / ".lock"), _bytes_bar(contents, f"fetching {contents.label}") as bar:
+    with alone_in(folder), _bytes_bar(contents, f"fetching {contents.label}") as bar:
         fetch(place, contents, folder, tick=bar.update)
     return folder
 

@@ -2,6 +2,7 @@ from .damage import cure_for as cure_for, require_place as require_place
 from .folders import (
     SHIPPED as SHIPPED,
     SOURCE as SOURCE,
+    alone_in as alone_in,
     bank_folder as bank_folder,
     cache_dir as cache_dir,
     fetched_banks as fetched_banks,

@@ -4,19 +4,28 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from filelock import FileLock, Timeout
+
 from shotenv.bank.files.layout import BankError
 from shotenv.config import ACQUISITION_FIELDS, BankConfig
-from unwrap.support import in_one_line, read_json
+from unwrap.support import in_one_line, read_json, say
 
 RENDERING_VERSION = 4
 """Raised when the same configuration would give other light: old banks are then left alone."""
 
 SOURCE = "source.json"
 """File in a bank's folder with the `identity` it is rendered from, written before any clip."""
+
+LOCK = ".lock"
+"""File in a folder that one process at a time writes."""
+SILENT_S = 1.0
+"""After so long whoever waits for another process is told."""
 
 SHIPPED = Path(__file__).parents[2] / "data"
 """Folder of the banks that come with the package."""
@@ -44,6 +53,21 @@ def bank_folder(config: BankConfig) -> Path:
     """
     content = json.dumps(identity(config), sort_keys=True)
     return cache_dir() / "banks" / f"{config.name}-{sha256(content.encode()).hexdigest()[:8]}"
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """While no other process writes the bank in `folder`; waits for one that does, and says so."""
+    lock = FileLock(folder / LOCK)
+    try:
+        lock.acquire(timeout=SILENT_S)
+    except Timeout:
+        say(f"another process writes {folder}; waiting for it")
+        lock.acquire()
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 def identity(config: BankConfig) -> dict[str, Any]:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 from contextlib import nullcontext
+from threading import Event, Thread
 
 import pytest
 
 from shotenv.bank import build as build_module
 from shotenv.bank.build import build_bank
 from shotenv.bank.clip_jobs import clip_jobs
-from shotenv.bank.files.folders import bank_folder as bank_folder_of
+from shotenv.bank.files import folders
+from shotenv.bank.files.folders import alone_in, bank_folder as bank_folder_of
 from shotenv.bank.files.layout import BankError
 from shotenv.config.bank import BankConfig
 from shotenv.config.families import FAMILIES, SHIFT_FAMILIES
@@ -175,3 +177,21 @@ def test_what_goes_wrong_beside_the_workers_ends_them_at_once(config, tmp_path, 
     with pytest.raises(BrokenPipeError) as kept:
         build_module.render_clips(clip_jobs(config, tmp_path), None, "ray")
     assert ended and kept.tb is not None
+
+
+def test_who_waits_for_another_process_is_told(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(folders, "SILENT_S", 0.05)
+    entered = Event()
+
+    def wait_and_enter():
+        with alone_in(tmp_path):
+            entered.set()
+
+    waiting = Thread(target=wait_and_enter)
+    with alone_in(tmp_path):
+        waiting.start()
+        waiting.join(0.5)
+        assert not entered.is_set()
+    waiting.join(10)
+    assert entered.is_set()
+    assert capsys.readouterr().err == f"another process writes {tmp_path}; waiting for it\n"
