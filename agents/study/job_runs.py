@@ -35,7 +35,7 @@ from agents.study.published_jobs import (
 from agents.training import train_scheduler
 from shotenv.config import EnvConfig
 from shotenv.decision import open_problem
-from unwrap.execution import Executor, output_to, run_tasks, visible
+from unwrap.execution import Executor, is_seen, output_to, run_tasks, visible
 from unwrap.support import progress, say
 
 JOBS_PER_WORKER = 1000
@@ -49,6 +49,7 @@ class JobTask(NamedTuple):
     folder: Path
     depends_on: dict[str, Any]
     url: str | None = None
+    executor: Executor = "local"
 
 
 def run_jobs(
@@ -88,7 +89,7 @@ def run_jobs(
     # Renders and predicts, too, what several processes would else do at the same time.
     banks = banks_of(jobs)
     left = [
-        JobTask(job, folder, told, url)
+        JobTask(job, folder, told, url, executor)
         for job in jobs
         if not stands(folder / job.name, told := job.depends_on(banks))
     ]
@@ -113,6 +114,8 @@ def run_jobs(
                     say(f"{error}; the others go on")  # Now, and not hours later.
                 elif url is not None:
                     fetch_result(url, task.job, folder)
+                else:
+                    is_seen(beside(folder / task.job.name, ".json"), executor)
                 order.release(task)
                 bar.update(1)
         except KeyboardInterrupt:
@@ -183,6 +186,8 @@ def run_job(task: JobTask) -> None:
         return
     began, (job, folder, depends_on) = time.process_time(), task[:3]
     stem = visible(folder) / job.name
+    if job.source is not None:
+        is_seen(beside(folder / job.source.name, ".json"), task.executor)
     stem.parent.mkdir(parents=True, exist_ok=True)
     with output_to(beside(stem, ".log")):
         config, arrays = job.config, {}

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import shutil
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from shotenv.bank.clip_jobs import ClipJob, clip_jobs
 from shotenv.bank.files import (
+    CLIP_RECORD,
     CLIPS,
     MANIFEST,
     SOURCE,
@@ -31,7 +31,7 @@ from shotenv.render.backend import (
     limit_threads,
     require_device,
 )
-from unwrap.execution import Executor, WorkerError, available_cores, run_tasks
+from unwrap.execution import Executor, WorkerError, available_cores, is_seen, run_tasks
 from unwrap.signal import Shots
 from unwrap.storage import StorageError
 from unwrap.support import progress, say, write_json
@@ -43,10 +43,6 @@ of scenes that had to be built first."""
 
 FRAMES_PER_WORKER = 512
 """Rendered frames after which a worker process is replaced: rebuilding scenes leaks memory."""
-
-SEEN_S = 60.0
-"""After so long a file of another machine is seen by this one: NFS keeps for a minute what was
-not there."""
 
 DISK_MARGIN = 1.05
 """Free space asked for, over what the arrays take: records and file system want some, too."""
@@ -104,8 +100,7 @@ def build_bank(
         render_clips(missing, workers, executor)
         _delete_half_written(folder)
         size = (config.camera.height, config.camera.width)
-        seen_s = SEEN_S if executor == "ray" else 0.0
-        records = [_record(job, seen_s) for job in jobs]
+        records = [_record(job, executor) for job in jobs]
         write_manifest(folder, config.name, records, size, config)
     return folder
 
@@ -129,22 +124,20 @@ def _delete_half_written(folder: Path) -> None:
         leftover.unlink()
 
 
-def _record(job: ClipJob, seen_s: float) -> ClipRecord:
-    """Record of a clip that is rendered, which another machine's may be seen only after `seen_s`.
+def _record(job: ClipJob, executor: Executor) -> ClipRecord:
+    """Record of a clip that is rendered.
 
     Raises
     ------
     WorkerError
         It is not in this machine's folder.
     """
-    end = time.monotonic() + seen_s
-    while (record := read_clip_record(job.folder)) is None:
-        if time.monotonic() > end:
-            raise WorkerError(
-                f"{job.name} was rendered, but is not in {job.folder.parent} of this machine; "
-                "expected a folder that all machines share"
-            )
-        time.sleep(0.5)
+    is_seen(job.folder / CLIP_RECORD, executor)
+    if (record := read_clip_record(job.folder)) is None:
+        raise WorkerError(
+            f"{job.name} was rendered, but is not in {job.folder.parent} of this machine; "
+            "expected a folder that all machines share"
+        )
     return record
 
 

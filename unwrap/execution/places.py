@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import platform
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from unwrap.execution.work import WorkerError
+from unwrap.execution.work import Executor, WorkerError
+
+SEEN_S = 60.0
+"""After so long a file of another machine is seen by this one: NFS keeps for a minute what was
+not there."""
+CHECK_S = 0.5
+"""How often is looked."""
 
 
 def visible(folder: Path) -> Path:
@@ -24,6 +31,16 @@ def visible(folder: Path) -> Path:
             "machines share"
         )
     return folder
+
+
+def is_seen(file: Path, executor: Executor) -> bool:
+    """Whether `file` is there, of a task that has ended; waits for one of another machine."""
+    end = time.monotonic() + (SEEN_S if executor == "ray" else 0.0)
+    while not file.is_file():
+        if time.monotonic() >= end:
+            return False
+        time.sleep(CHECK_S)
+    return True
 
 
 @contextlib.contextmanager
