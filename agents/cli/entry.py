@@ -36,7 +36,7 @@ from agents.cli.command import (
     check_outputs,
     execution_of,
 )
-from shotenv.config import ConfigError, imports_refused, one_sentence
+from shotenv.config import ConfigError, imports_refused, in_plain_words, one_sentence
 from unwrap.execution import check_execution
 
 OWN_PACKAGES = ("agents", "shotenv", "unwrap")
@@ -146,38 +146,12 @@ def _parsed(command: Command, words: list[str]) -> Namespace:
         with imports_refused():
             arguments = parser.instantiate(parser.parse_args(words))
     except (ArgumentError, ValueError, TypeError) as error:
-        raise ConfigError(_plain(one_sentence(error))) from None
+        raise ConfigError(in_plain_words(one_sentence(error))) from None
     # Before minutes are spent on what could not be written then.
     check_outputs(arguments, out_is_file=command.out_is_file)
     if "executor" in arguments:
         check_execution(**execution_of(arguments))
     return arguments
-
-
-def _plain(message: str) -> str:
-    """A validation message without what only the libraries' authors need."""
-    # In turn: where jsonargparse found it, pydantic's count of errors, its and jsonargparse's words
-    # for what was expected, what it says of a file twice, and pydantic's note on the value.
-    for pattern, kept in (
-        (r'Parser key "([^"]+)"(?: element \d+)?: ', r"\1: "),
-        (r"\d+ validation errors? for [\w-]+ ", ""),
-        (r"Input should be", "expected to be"),
-        (r"Not of type \w+: (\S+) does not conform to restriction v>0", r"\1; expected above 0"),
-        (
-            r"Not of type \w+: (\S+) does not conform to restriction v>=0",
-            r"\1; expected at least 0",
-        ),
-        (r"Not of type \w+: invalid literal for int\(\).*?: (.*)", r"\1; expected a whole number"),
-        (r"Expected a (?:typing\.)?Literal\[(.*?)\]\. Got value: (.*)", r"\2; expected one of \1"),
-        (r"Expected a <class '(\w+)'>\. Got value: (.*)", r"\2; expected \1"),
-        (
-            r"""Unable to load config '(.*?)' - .*Unable to load config ".*\"""",
-            r"\1; expected a file of keys with values",
-        ),
-        (r"\[type=\w+, input_value=(.*?), input_type=\w+\]", r"(got \1)"),
-    ):
-        message = re.sub(pattern, kept, message)
-    return message
 
 
 def _overview(words: list[str]) -> int:

@@ -30,6 +30,7 @@ from .reader import (
     ConfigError as ConfigError,
     configs_dir as configs_dir,
     find_config as find_config,
+    in_plain_words as in_plain_words,
     merged as merged,
     one_sentence as one_sentence,
     read_config as read_config,

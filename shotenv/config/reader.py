@@ -24,6 +24,30 @@ UNKNOWN_KEY = re.compile(r"does not accept option '([\w.]+)'")
 NO_MAPPING = re.compile(r"""^.*Parser key "([\w.]+)": Unable to load config "(.*)"$""")
 NOT_LOADED = re.compile(r"""^Parser key "config": Unable to load config '.*?' - """)
 """What it says of a file that is a word or a list, and before what YAML says of it."""
+# In turn: where jsonargparse found it, pydantic's count of errors, its and jsonargparse's words for
+# what was expected, what it says of a file twice, of classes, and pydantic's note on the value.
+PLAINER = (
+    (r'Parser key "config": ', ""),
+    (r'Parser key "([^"]+)"(?: element \d+)?: ', r"\1: "),
+    (r"\d+ validation errors? for (?:function-\w+\[.*?\]|[\w-]+(?:\[.*?\])?) ", ""),
+    (r"\b(\d+) Field required", r"element \1 is missing"),
+    (r"Input should be", "expected to be"),
+    (r"Not of type \w+: (\S+) does not conform to restriction v>0", r"\1; expected above 0"),
+    (r"Not of type \w+: (\S+) does not conform to restriction v>=0", r"\1; expected at least 0"),
+    (r"Not of type \w+: invalid literal for int\(\).*?: (.*)", r"\1; expected a whole number"),
+    (r"Expected a (?:typing\.)?Literal\[(.*?)\]\. Got value: (.*)", r"\2; expected one of \1"),
+    (r"Expected a <class '(\w+)'>\. Got value: (.*)", r"\2; expected \1"),
+    (
+        r"""Unable to load config '(.*?)' - .*Unable to load config ".*\"""",
+        r"\1; expected a file of keys with values",
+    ),
+    (
+        r"Subclasses are disabled for (\w+), thus '(.*?)' is not accepted as class_path\..*",
+        r"class_path is '\2'; expected the keys of \1",
+    ),
+    (r"\[type=\w+, input_value=(.*?), input_type=\w+\]", r"(got \1)"),
+)
+"""Patterns of what libraries say, and what a user is told."""
 MOST_COMPLAINTS, LONGEST_VALUE = 8, 120
 """Told of one file, which may be wrong in thousands of places; characters of a wrong value."""
 
@@ -80,7 +104,7 @@ def read_config(model: type[Model], path: Path, overrides: Sequence[str] = ()) -
             sentence = _no_mapping(*word.groups())
         # Some of these errors begin with the file.
         sentence = NOT_LOADED.sub("", sentence).removeprefix(f"{path.name}: ")
-        raise ConfigError(f"{path.name}: {sentence}") from None
+        raise ConfigError(f"{path.name}: {in_plain_words(sentence)}") from None
 
 
 def one_sentence(error: Exception, model: type[Section] | None = None) -> str:
@@ -97,6 +121,13 @@ def one_sentence(error: Exception, model: type[Section] | None = None) -> str:
         return error.strerror  # Whoever tells it names the file.
     kept = [line.strip() for line in str(error).splitlines() if "errors.pydantic.dev" not in line]
     return " ".join(" ".join(kept).replace("config.", "").split())
+
+
+def in_plain_words(sentence: str) -> str:
+    """A complaint of jsonargparse or pydantic without what only the libraries' authors need."""
+    for pattern, kept in PLAINER:
+        sentence = re.sub(pattern, kept, sentence)
+    return sentence
 
 
 def _complaint(detail: Any, model: type[Section] | None) -> str:
