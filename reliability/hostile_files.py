@@ -19,16 +19,19 @@ import time
 import warnings
 from dataclasses import asdict, dataclass, field
 from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
+import psutil
 import torch
 
 from reliability.hostile_kinds import KINDS, Kind
 from reliability.mutations import mutate
 from reliability.rows import Progress, Row
 
-LONGEST_S = 10.0
-"""Of a read: some hundred times what it takes."""
+LONGEST_S, LONGEST_WAIT_S, FIRST_S = 10.0, 60.0, 120.0
+"""Of a read: seconds of the processor, some hundred times what it takes; seconds of waiting, on a
+machine that others use; and what imports come before."""
 MOST_BYTES = 1 << 31
 """Of memory beyond that which the process has before its first read."""
 SEED = 20
@@ -125,7 +128,8 @@ def _in_a_process(
     try:
         while next_number < numbers.stop:
             # The first answer comes after the imports.
-            if not ours.poll(LONGEST_S if way != "the sound file" else 120.0):
+            first = way == "the sound file"
+            if not (ours.poll(FIRST_S) if first else _answers(ours, worker)):
                 tally.hangs.append(f"{next_number} {way}")
                 next_number += 1
                 break
@@ -150,6 +154,18 @@ def _in_a_process(
         worker.join()
         ours.close()
     return next_number
+
+
+def _answers(pipe: Connection, worker: BaseProcess) -> bool:
+    """Whether something comes before the worker has computed, or waited, for too long."""
+    process = psutil.Process(worker.pid)
+    begun_s, before_s = time.monotonic(), sum(process.cpu_times()[:2])
+    while time.monotonic() - begun_s < LONGEST_WAIT_S:
+        if pipe.poll(1.0):
+            return True
+        if sum(process.cpu_times()[:2]) - before_s > LONGEST_S:
+            return False
+    return False
 
 
 def _read_all(
