@@ -94,7 +94,7 @@ def test_the_renderers_error_is_small_beside_the_sensors(family, world_seed, sen
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ["garage", "warehouse"])
 def test_few_paths_often_are_many_paths_once(family, sensor):
-    """4 paths a pixel, 256 times with other seeds, against 4096 paths, by the standard error."""
+    """4 paths a pixel, 128 times with other seeds, against 4096 paths, by the standard error."""
     renderer = FrameRenderer(draw_world(family, WORLD_SEED, WorldConfig()), sensor)
     few = CAMERA.model_copy(update={"width": 32, "height": 24})
     many = few.model_copy(update={"samples_per_pixel": 512})
@@ -103,8 +103,8 @@ def test_few_paths_often_are_many_paths_once(family, sensor):
         frames = [renderer.frame(TIME_S, camera, seed=seed).correlation for seed in seeds]
         return np.stack([f[0] - f[2] + 1j * (f[1] - f[3]) for f in frames])
 
-    ours, reference = phasors(few, range(256)), phasors(many, range(1000, 1008))
-    error = np.sqrt(ours.var(axis=0) / 256 + reference.var(axis=0, ddof=1) / 8)
+    ours, reference = phasors(few, range(128)), phasors(many, range(1000, 1008))
+    error = np.sqrt(ours.var(axis=0) / 128 + reference.var(axis=0, ddof=1) / 8)
     apart = np.abs(ours.mean(axis=0) - reference.mean(axis=0))
     lit = np.abs(reference).min(axis=0) > 0
     assert np.sqrt(((apart / error)[lit] ** 2).mean()) < 1.5

@@ -82,7 +82,9 @@ def test_ctrl_c_before_a_command_has_begun_promises_nothing(capsys, monkeypatch)
 
 def test_an_interrupted_training_of_the_command_line_goes_on(capsys, monkeypatch, tmp_path, tiny):
     small = "--agent.ppo.total_steps 96 --agent.ppo.num_envs 2 --agent.ppo.rollout_steps 16"
-    small += " --agent.ppo.batch_size 16 --env.frames_per_drive 16 --study.tuning_drives 2"
+    small += " --agent.ppo.batch_size 16 --agent.ppo.drives 2 --env.frames_per_drive 16"
+    small += " --study.tuning_drives 2 --agent.regression.drives 4 --agent.regression.members 1"
+    small += " --agent.regression.validation_drives 4 --agent.regression.rounds 2"
     words = ("train", *small.split(), *tiny)
     judge, judged = Branches.mean_return, []
 
@@ -257,7 +259,8 @@ def test_reports_of_several_evaluations_are_compared(capsys, tmp_path, monkeypat
 def test_demo_does_the_main_job(capsys, tmp_path, tiny):
     out = tmp_path / "demo"
     small = "--agent.ppo.total_steps 64 --agent.ppo.num_envs 2 --agent.ppo.rollout_steps 16"
-    small += " --agent.ppo.batch_size 16"
+    small += " --agent.ppo.batch_size 16 --agent.ppo.drives 2 --agent.regression.drives 4"
+    small += " --agent.regression.validation_drives 4 --agent.regression.members 1"
     small += " --env.frames_per_drive 16 --study.drives 2 --study.tuning_drives 2"
     small += " --study.bootstrap_draws 100 --study.prices [0.01,0.1]"
     small += " --study.families [snr_threshold,cycle]"
