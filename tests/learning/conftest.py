@@ -16,8 +16,8 @@ def learnability():
 def over_fixed(learnability):
     """Trains an algorithm; its return over each fixed choice's, on the same drives."""
 
-    def over_fixed(algorithm):
-        agent = learnability.train(algorithm, seed=0)
+    def over_fixed(algorithm, steps=learnability.STEPS):
+        agent = learnability.train(algorithm, seed=0, steps=steps)
         drives = learnability.played({"agent": agent})
         return learnability.compared(drives.pop("agent"), drives)
 

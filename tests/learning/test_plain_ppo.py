@@ -6,7 +6,8 @@ import pytest
 @pytest.mark.slow
 @pytest.mark.timeout(1500)
 def test_ppo_with_library_defaults_beats_every_fixed_choice(over_fixed):
-    over = over_fixed("PPO")
+    # Two thirds of what the page of the problem gives it, which is enough.
+    over = over_fixed("PPO", steps=52 * 2048)
     assert over.keys() == {"always_2", "always_4", "always_8"}
     for fixed, difference in over.items():
         assert difference["low"] > 0.0, f"{fixed}: {difference}"

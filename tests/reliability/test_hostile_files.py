@@ -13,7 +13,7 @@ SLOW = ("evaluation", "trusted", "recorded", "thinned", "XML", "Kinect")
 def kinds():
     for kind in KINDS:
         slow = any(word in kind.name for word in SLOW)
-        yield pytest.param(kind, 6 if slow else 20, id=kind.name.replace(" ", "-"))
+        yield pytest.param(kind, 6 if slow else 10, id=kind.name.replace(" ", "-"))
 
 
 @pytest.mark.slow

@@ -80,18 +80,16 @@ def kill_at_a_random_moment(process: subprocess.Popen, folder, moment: random.Ra
     process.communicate()
 
 
-@pytest.mark.parametrize("kills", [1, pytest.param(3, marks=pytest.mark.slow)])
-def test_a_rendering_killed_again_and_again_gives_the_same_bank(
-    config, uninterrupted, tmp_path, kills
-):
-    folder, moment = tmp_path / "bank", random.Random(kills)
-    for _ in range(kills):
+def test_a_rendering_killed_again_and_again_gives_the_same_bank(config, uninterrupted, tmp_path):
+    """Twice; `python -m reliability kills` does it twenty times, at any moment."""
+    folder, moment = tmp_path / "bank", random.Random(2)
+    for _ in range(2):
         kill_at_a_random_moment(start(config, folder), folder, moment)
         assert standing(folder) < len(clip_jobs(config, folder)), "killed too late to prove it"
         with pytest.raises(BankError, match=r"holds no manifest\.json"):
             read_manifest(folder)
     kept = {path: path.stat().st_mtime_ns for path in folder.glob("clips/*/clip.json")}
-    assert len(kept) >= kills
+    assert len(kept) >= 2
     build_bank(config, folder, workers=2)
     assert read_manifest(folder) == read_manifest(uninterrupted)
     assert verify(folder) == ()
