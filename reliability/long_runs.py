@@ -28,11 +28,24 @@ from reliability.small import write_small_bank_config
 STEPS, FRAMES, VECTOR = 1_000_000, 100_000, 16
 MOST_MB, MOST_PARENT_MB = 10.0, 50.0
 SLOWER = 1.15
-"""Median step of the last tenth over that of the first; a machine that others use is not steadier
-(assumed)."""
+"""Median step of the last tenth over that of the first, each beside other work of its time; a
+machine that others use is not steadier (assumed)."""
 PARTS = 20
+WEIGHED, WEIGHED_EVERY = torch.arange(32.0), 50
+"""What other work is done with, and every how manieth step."""
 FRAMES_PER_CLIP = 500
 PROGRAM = "import sys; from reliability.long_runs import walk; walk(int(sys.argv[1]), sys.argv[2])"
+
+
+def yardstick_s() -> float:
+    """Processor time of a piece of work that is always the same, of small tensors as steps are.
+
+    A machine that others use is slower at some times than at others, at both alike.
+    """
+    begun = time.process_time()
+    for _ in range(20):
+        torch.stack([WEIGHED] * 4).index_select(0, torch.tensor([2, 0])).sum().numpy()
+    return time.process_time() - begun
 
 
 def walk(steps: int, kind: str) -> None:
@@ -42,20 +55,25 @@ def walk(steps: int, kind: str) -> None:
     env = gymnasium.make(name) if size == 1 else gymnasium.make_vec(name, num_envs=size)
     random = np.random.default_rng(0)
     env.reset(seed=0)
-    memory, seconds, files = [], [], []
+    memory, seconds, yardsticks, files = [], [], [], []
     for _ in range(PARTS):
-        taken = []
+        taken, others = [], []
         for chosen in random.integers(0, 3, (steps // PARTS // size, size)):
             # Of the processor: how much of it others leave is nothing that a step does.
             begun = time.process_time()
             _, _, terminated, truncated, _ = env.step(chosen if size > 1 else chosen[0])
             taken.append(time.process_time() - begun)
+            if len(taken) % WEIGHED_EVERY == 0:
+                others.append(yardstick_s())
             if size == 1 and (terminated or truncated):
                 env.reset()
         memory.append(memory_mb())
         seconds.append(statistics.median(taken))
+        yardsticks.append(statistics.median(others))
         files.append(descriptors())
-    print(json.dumps({"memory": memory, "seconds": seconds, "files": files}))
+    print(
+        json.dumps({"memory": memory, "seconds": seconds, "yardsticks": yardsticks, "files": files})
+    )
 
 
 def of_steps(kind: str, steps: int, cache: Path) -> Row:
@@ -68,7 +86,8 @@ def of_steps(kind: str, steps: int, cache: Path) -> Row:
     # Twenty parts: two are a tenth. Highest afterwards over the end of the warm-up.
     memory, seconds, tenth = told["memory"], told["seconds"], PARTS // 10
     growth_mb = max(memory[tenth:]) - memory[tenth - 1]
-    drift = statistics.mean(seconds[-tenth:]) / statistics.mean(seconds[:tenth])
+    weighed = [own / other for own, other in zip(seconds, told["yardsticks"], strict=True)]
+    drift = statistics.mean(weighed[-tenth:]) / statistics.mean(weighed[:tenth])
     more = told["files"][-1] - told["files"][0]
     return Row(
         9,
@@ -77,7 +96,7 @@ def of_steps(kind: str, steps: int, cache: Path) -> Row:
             "growth after the first tenth, MB": round(growth_mb, 2),
             "memory by twentieths, MB": [round(value, 1) for value in memory],
             "new file descriptors": more,
-            "median step, last tenth over first": round(drift, 3),
+            "median step beside other work, last tenth over first": round(drift, 3),
             "median step, us of the processor": round(1e6 * statistics.median(seconds), 1),
         },
         growth_mb <= MOST_MB and more <= 0 and drift <= SLOWER,
