@@ -30,7 +30,7 @@ def measured(name: str, progress: Progress) -> bool:
         # The others are measured all the same: they take hours together.
         traceback.print_exc()
         return False
-    seconds = time.perf_counter() - begun
+    seconds = time.perf_counter() - begun + sum(progress.before_s)
     print("\n".join(printed(row) for row in rows))
     print(f"{name}: {seconds:.0f} s", flush=True)
     if not progress.quick:

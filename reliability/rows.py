@@ -8,7 +8,7 @@ import time
 import traceback
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -58,11 +58,14 @@ class Progress:
         Where a line goes; by default it is printed at once.
     parts : Path, optional
         File of the parts that are done, with a line of JSON each; without one none is kept.
+    before_s : list of float
+        What each part took that was done before.
     """
 
     quick: bool = False
     say: Callable[[str], None] = lambda words: print(words, flush=True)
     parts: Path | None = None
+    before_s: list[float] = field(default_factory=list)
 
     def __call__(self, words: str) -> None:
         self.say(f"  {words}")
@@ -73,16 +76,19 @@ class Progress:
 
     def part(self, name: str, make: Callable[[], Any]) -> Any:
         """What `make` gives, as JSON has it; of an interrupted measurement, what it gave then."""
-        for kept_name, value in self._kept():
+        for kept_name, value, seconds in self._kept():
             if kept_name == name:
                 self(f"{name}: done before")
+                self.before_s.append(seconds)
                 return value
+        begun = time.perf_counter()
         value = make()
+        seconds = time.perf_counter() - begun
         if self.parts is not None:
             self.parts.parent.mkdir(exist_ok=True)
             with self.parts.open("a", encoding="utf-8") as file:
                 # On a line of its own, whatever a killed process has left of its last.
-                file.write("\n" + json.dumps([name, value]))
+                file.write("\n" + json.dumps([name, value, seconds]))
         return value
 
     def row(self, promise: int, name: str, make: Callable[[], Row]) -> Row:
@@ -97,13 +103,14 @@ class Progress:
         self(str(row))
         return row
 
-    def _kept(self) -> list[tuple[str, Any]]:
+    def _kept(self) -> list[tuple[str, Any, float]]:
         if self.parts is None or not self.parts.is_file():
             return []
         found = []
         for line in self.parts.read_text(encoding="utf-8").splitlines():
             with suppress(ValueError):  # The last line of a process that was killed.
-                found.append(tuple(json.loads(line)))
+                name, value, seconds = json.loads(line)
+                found.append((name, value, seconds))
         return found
 
 

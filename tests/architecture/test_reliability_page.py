@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -85,6 +86,14 @@ def test_an_interrupted_measurement_goes_on(monkeypatch, tmp_path):
     assert asked == ["first", "second", "second"]
     rows.keep("rows", [ROW, ROW], 1.0)
     assert [path.name for path in tmp_path.iterdir()] == ["rows.json"]
+
+
+def test_what_parts_took_before_counts(tmp_path):
+    first, again = (Progress(say=print, parts=tmp_path / "rows.parts") for _ in range(2))
+    first.part("walk", lambda: time.sleep(0.05))
+    assert first.before_s == []
+    again.part("walk", lambda: pytest.fail("done before"))
+    assert 0.05 <= sum(again.before_s) < 5.0
 
 
 def test_a_trial_is_small():
