@@ -35,7 +35,7 @@ from agents.study.published_jobs import (
 from agents.training import train_scheduler
 from shotenv.config import EnvConfig
 from shotenv.decision import open_problem
-from unwrap.execution import Executor, is_seen, output_to, run_tasks, visible
+from unwrap.execution import Executor, output_to, run_tasks, visible, wait_for_file
 from unwrap.support import progress, say
 
 JOBS_PER_WORKER = 1000
@@ -115,7 +115,7 @@ def run_jobs(
                 elif url is not None:
                     fetch_result(url, task.job, folder)
                 else:
-                    is_seen(beside(folder / task.job.name, ".json"), executor)
+                    wait_for_file(beside(folder / task.job.name, ".json"), executor)
                 order.release(task)
                 bar.update(1)
         except KeyboardInterrupt:
@@ -187,7 +187,7 @@ def run_job(task: JobTask) -> None:
     began, (job, folder, depends_on) = time.process_time(), task[:3]
     stem = visible(folder) / job.name
     if job.source is not None:
-        is_seen(beside(folder / job.source.name, ".json"), task.executor)
+        wait_for_file(beside(folder / job.source.name, ".json"), task.executor)
     stem.parent.mkdir(parents=True, exist_ok=True)
     with output_to(beside(stem, ".log")):
         config, arrays = job.config, {}

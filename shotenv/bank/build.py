@@ -31,7 +31,7 @@ from shotenv.render.backend import (
     limit_threads,
     require_device,
 )
-from unwrap.execution import Executor, WorkerError, available_cores, is_seen, run_tasks
+from unwrap.execution import Executor, WorkerError, available_cores, run_tasks, wait_for_file
 from unwrap.signal import Shots
 from unwrap.storage import StorageError
 from unwrap.support import progress, say, write_json
@@ -132,7 +132,7 @@ def _record(job: ClipJob, executor: Executor) -> ClipRecord:
     WorkerError
         It is not in this machine's folder.
     """
-    is_seen(job.folder / CLIP_RECORD, executor)
+    wait_for_file(job.folder / CLIP_RECORD, executor)
     if (record := read_clip_record(job.folder)) is None:
         raise WorkerError(
             f"{job.name} was rendered, but is not in {job.folder.parent} of this machine; "

@@ -33,8 +33,8 @@ def visible(folder: Path) -> Path:
     return folder
 
 
-def is_seen(file: Path, executor: Executor) -> bool:
-    """Whether `file` is there, of a task that has ended; waits for one of another machine."""
+def wait_for_file(file: Path, executor: Executor) -> bool:
+    """Wait for `file`, of a task that has ended, where another machine wrote it; whether it is there."""
     end = time.monotonic() + (SEEN_S if executor == "ray" else 0.0)
     while not file.is_file():
         if time.monotonic() >= end:

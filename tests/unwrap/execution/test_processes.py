@@ -17,7 +17,7 @@ from watched_processes import is_alive, wait_until
 
 from unwrap.execution import places
 from unwrap.execution.cores import available_cores
-from unwrap.execution.places import is_seen, visible
+from unwrap.execution.places import visible, wait_for_file
 from unwrap.execution.tasks import run_tasks
 from unwrap.execution.work import WorkerError
 from unwrap.support import StoppedWatch, workers
@@ -178,9 +178,9 @@ def test_a_folder_that_is_not_seen_is_named_with_the_machine(tmp_path):
 def test_a_file_of_another_machine_is_waited_for_and_one_of_this_is_not(tmp_path, monkeypatch):
     monkeypatch.setattr(places, "CHECK_S", 0.01)
     own, others = tmp_path / "own", tmp_path / "others"
-    assert not is_seen(own, "local")
+    assert not wait_for_file(own, "local")
     looks = iter((False, False, True))
     monkeypatch.setattr(Path, "is_file", lambda path: path == others and next(looks))
-    assert is_seen(others, "ray") and next(looks, None) is None
+    assert wait_for_file(others, "ray") and next(looks, None) is None
     monkeypatch.setattr(places, "SEEN_S", 0.05)
-    assert not is_seen(own, "ray")
+    assert not wait_for_file(own, "ray")
