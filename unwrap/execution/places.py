@@ -34,7 +34,7 @@ def visible(folder: Path) -> Path:
 
 
 def wait_for_file(file: Path, executor: Executor) -> bool:
-    """Wait for `file`, of a task that has ended, where another machine wrote it; whether it is there."""
+    """Wait for `file`, of a task that has ended and may have run elsewhere; whether it is there."""
     end = time.monotonic() + (SEEN_S if executor == "ray" else 0.0)
     while not file.is_file():
         if time.monotonic() >= end:
