@@ -15,7 +15,7 @@ from shotenv.config.env import EnvConfig
 from shotenv.config.laser import LaserConfig
 from shotenv.config.reader import ConfigError, find_config, merged, read_config
 from shotenv.config.sensor import SensorConfig
-from unwrap.support import Section
+from unwrap.support import Section, in_short
 
 SECTIONS: Mapping[str, type[Section]] = {"sensor": SensorConfig, "laser": LaserConfig}
 """Fields of `EnvConfig` that have a folder of files in `configs/`."""
@@ -54,7 +54,9 @@ def env_config(config: str = "default", **fields: Any) -> EnvConfig:
 def _read(model: type[Section], section: str, keyword: str, value: Any) -> Any:
     """The section in the file that `value` names, which was given for `keyword`."""
     if not isinstance(value, str | Path):
-        raise ConfigError(f"{keyword} is {value!r}; expected a name, a path or a mapping of values")
+        raise ConfigError(
+            f"{keyword} is {in_short(value)}; expected a name, a path or a mapping of values"
+        )
     path = find_config(section, str(value))
     return _read_version(model, path, path.stat().st_mtime_ns)
 

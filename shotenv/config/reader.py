@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from shotenv.config.imported_names import imports_refused
 from shotenv.config.yaml_limits import MOST_YAML_BYTES, limit_yaml
-from unwrap.support import Section, require_regular
+from unwrap.support import Section, in_short, require_regular
 
 # Here and not in `read_config`: the command line's own parsers read files, too, and each of them is
 # made of names that come through this file.
@@ -48,8 +48,8 @@ PLAINER = (
     (r"\[type=\w+, input_value=(.*?), input_type=\w+\]", r"(got \1)"),
 )
 """Patterns of what libraries say, and what a user is told."""
-MOST_COMPLAINTS, LONGEST_VALUE = 8, 120
-"""Told of one file, which may be wrong in thousands of places; characters of a wrong value."""
+MOST_COMPLAINTS = 8
+"""Told of one file, which may be wrong in thousands of places."""
 
 
 class ConfigError(ValueError):
@@ -139,9 +139,7 @@ def _complaint(detail: Any, model: type[Section] | None) -> str:
     # Of what is missing, the input is all around it.
     if not detail["loc"] or detail["type"] == "missing":
         return f"{where}: {message}" if detail["loc"] else message
-    got = repr(detail["input"])
-    shown = got if len(got) <= LONGEST_VALUE else f"{got[:LONGEST_VALUE]}..."
-    return f"{where}: {message}, got {shown}"
+    return f"{where}: {message}, got {in_short(detail['input'])}"
 
 
 def _unknown(place: Sequence[Any], model: Any) -> str:

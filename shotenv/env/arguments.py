@@ -14,6 +14,7 @@ from gymnasium.vector import AutoresetMode
 
 from shotenv.decision import FEATURES, LIMIT, TERMS
 from unwrap.signal import Shots
+from unwrap.support import in_short
 
 OBSERVATIONS = ("features", "image")
 RENDER_MODES = ("rgb_array", "human")
@@ -57,7 +58,9 @@ def check_action(action: Any) -> int:
     """
     value = np.asarray(action)
     if value.shape != () or value.dtype.kind not in "iu" or not 0 <= value < ACTIONS:
-        raise ValueError(f"action is {action!r}; expected 0 (2 DCS), 1 (4 DCS) or 2 (8 DCS)")
+        raise ValueError(
+            f"action is {in_short(action)}; expected 0 (2 DCS), 1 (4 DCS) or 2 (8 DCS)"
+        )
     return int(value)
 
 
@@ -73,24 +76,10 @@ def check_actions(actions: Any, num_envs: int) -> torch.Tensor:
     whole = values.shape == (num_envs,) and values.dtype.kind in "iu"
     if not whole or values.min() < 0 or values.max() >= ACTIONS:
         raise ValueError(
-            f"actions are {actions!r}; expected {num_envs} whole numbers 0 (2 DCS), "
+            f"actions are {in_short(actions)}; expected {num_envs} whole numbers 0 (2 DCS), "
             "1 (4 DCS) or 2 (8 DCS)"
         )
     return torch.from_numpy(values.astype(np.int64))
-
-
-def check_choice(name: str, value: Any, known: tuple[str, ...]) -> Any:
-    """`value` where it is one of `known`.
-
-    Raises
-    ------
-    ValueError
-        It is none of them.
-    """
-    if not isinstance(value, str) or value not in known:
-        listed = ", ".join(repr(one) for one in known)
-        raise ValueError(f"{name} is {value!r}; expected one of {listed}")
-    return value
 
 
 def spec_of_drives(spec: EnvSpec | None, frames_per_drive: int) -> EnvSpec | None:
@@ -131,7 +120,9 @@ def check_count(num_envs: Any) -> int:
         It is no whole number of 1 to `MOST_ENVS`.
     """
     if not isinstance(num_envs, int) or not 1 <= num_envs <= MOST_ENVS:
-        raise ValueError(f"num_envs is {num_envs!r}; expected a whole number of 1 to {MOST_ENVS}")
+        raise ValueError(
+            f"num_envs is {in_short(num_envs)}; expected a whole number of 1 to {MOST_ENVS}"
+        )
     return num_envs
 
 

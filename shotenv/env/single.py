@@ -30,7 +30,6 @@ from shotenv.env.arguments import (
     OBSERVATIONS,
     RENDER_MODES,
     check_action,
-    check_choice,
     objective_space,
     observation_space,
     spec_of_drives,
@@ -42,6 +41,7 @@ from shotenv.env.image_observation import depth_images, gray_images, no_depth_im
 from shotenv.env.info import family_codes, family_names, info_columns, info_of
 from shotenv.env.picture import Trace, paint_drive
 from shotenv.env.reset_options import check_options
+from unwrap.support import require_choice
 
 
 class ShotScheduleEnv(gymnasium.Env[Any, np.int64]):
@@ -97,9 +97,10 @@ class ShotScheduleEnv(gymnasium.Env[Any, np.int64]):
         outcomes: bool = False,
         **fields: Any,
     ) -> None:
-        self.observation = check_choice("observation", observation, OBSERVATIONS)
+        require_choice(OBSERVATIONS, observation=observation)
+        self.observation = observation
         if render_mode is not None:
-            check_choice("render_mode", render_mode, RENDER_MODES)
+            require_choice(RENDER_MODES, render_mode=render_mode)
         self.render_mode = render_mode
         self._drives = check_drives(drives)
         self._outcomes = outcomes

@@ -34,7 +34,6 @@ from shotenv.env.arguments import (
     OBSERVATIONS,
     check_actions,
     check_autoreset_mode,
-    check_choice,
     check_count,
     check_length,
     check_reset_mask,
@@ -59,7 +58,7 @@ from shotenv.env.info import (
 from shotenv.env.picture import Trace, paint_drive
 from shotenv.env.reset_options import ResetOptions, check_options
 from shotenv.env.single import objectives_of
-from unwrap.support import put, take
+from unwrap.support import put, require_choice, take
 
 RENDER_MODES = ("rgb_array",)
 
@@ -95,11 +94,12 @@ class ShotScheduleVectorEnv(VectorEnv):
         max_episode_steps: int | None = None,
         **fields: Any,
     ) -> None:
-        self.observation = check_choice("observation", observation, OBSERVATIONS)
+        require_choice(OBSERVATIONS, observation=observation)
+        self.observation = observation
         self.num_envs = check_count(num_envs)
         self.autoreset_mode = check_autoreset_mode(autoreset_mode)
         if render_mode is not None:
-            check_choice("render_mode", render_mode, RENDER_MODES)
+            require_choice(RENDER_MODES, render_mode=render_mode)
         self.render_mode = render_mode
         self._drives = check_drives(drives)
         self._outcomes = outcomes

@@ -10,6 +10,7 @@ from shotenv.config import Family, WorldConfig
 from shotenv.world.ego import draw_ego
 from shotenv.world.families import SETTINGS
 from shotenv.world.geometry import Site, World, draw_weather, lights
+from unwrap.support import require_choice
 
 
 def draw_world(family: Family, seed: int, config: WorldConfig) -> World:
@@ -31,8 +32,7 @@ def draw_world(family: Family, seed: int, config: WorldConfig) -> World:
     ValueError
         An unknown family, a negative seed, or a slowest speed that leaves the world.
     """
-    if family not in SETTINGS:
-        raise ValueError(f"family is {family!r}; expected one of {', '.join(SETTINGS)}")
+    require_choice(SETTINGS, family=family)
     if seed < 0:
         raise ValueError(f"seed is {seed}; expected a non-negative integer")
     # Seeded by its name, a family keeps its worlds when others come or go.

@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-WRITING = {"os.mkdir", "os.rename", "os.remove", "os.rmdir", "shutil.rmtree"}
+DELETES_BY_NAME = {"os.remove", "os.rmdir"}
+WRITING = {"os.mkdir", "os.rename", "shutil.rmtree", *DELETES_BY_NAME}
 
 
 class Killed(BaseException):
@@ -33,7 +34,12 @@ class _Moment:
         opens = event == "open" and (arguments[2] or 0) & (os.O_WRONLY | os.O_RDWR)
         if not (opens or event in WRITING):
             return
-        path = str(arguments[0])
+        if isinstance(arguments[0], int):  # Opened before, and counted then.
+            return
+        path = os.fsdecode(arguments[0])
+        if event in DELETES_BY_NAME and arguments[1] >= 0:
+            # Within a folder that is deleted with all that is in it.
+            path = str(Path(f"/proc/self/fd/{arguments[1]}").readlink() / path)
         # A lock ends with its process.
         if path.startswith(self._folder) and not path.endswith(".lock"):
             self.step()

@@ -70,7 +70,12 @@ def raise_before_others(mark: Path) -> None:
     """The second process raises and ends late; the first soon misses it, a third only waits."""
     rank = os.environ["LOCAL_RANK"]
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    ready = mark.with_suffix(".ready")
+    if rank == "0":
+        ready.touch()
     if rank == "1":
+        while not ready.exists():
+            time.sleep(0.05)
         atexit.register(time.sleep, 3)
         mark.touch()
         raise ValueError("frame 7 is damaged")

@@ -94,9 +94,15 @@ def surroundings(_: int) -> tuple[list[int], str | None, str]:
     return _PREPARED, os.environ.get("SHOTENV_TEST"), str(Path.cwd())
 
 
-def gpus_seen(_: int) -> str | None:
-    """Numbers of the GPUs that this process may use."""
-    return os.environ.get("CUDA_VISIBLE_DEVICES")
+def gpus_of_company(task: tuple[Path, int, int]) -> list[str]:
+    """Numbers of the GPUs that Ray gives this task, once all of them are at work at one time."""
+    import ray
+
+    folder, company, number = task
+    (folder / str(number)).touch()
+    while len(list(folder.iterdir())) < company:
+        time.sleep(0.05)
+    return [str(gpu) for gpu in ray.get_gpu_ids()]
 
 
 def killed_once(mark: str) -> str:

@@ -40,6 +40,7 @@ from unwrap.support import (
     array_of,
     can_loop,
     long_rows,
+    require_choice,
 )
 
 Eight = Literal["two_frequency", "kernel_density", "network"]
@@ -109,10 +110,8 @@ def correct(
     tensor([[[0.]]])
     tensor([[[6.2457]]])
     """
-    if not isinstance(merge, str) or merge not in RULES:
-        raise ValueError(f"merge is {merge!r}; expected one of {', '.join(RULES)}")
-    if eight not in get_args(Eight):
-        raise ValueError(f"eight is {eight!r}; expected one of {', '.join(get_args(Eight))}")
+    require_choice(RULES, merge=merge)
+    require_choice(get_args(Eight), eight=eight)
     check_frames(raw, predicted_m, sensor, offset_lsb, noise_lsb, shift_m)
     noise = sensor.noise_lsb if noise_lsb is None else noise_lsb
     calibration = _Calibration(sensor, offset_lsb, noise, shift_m)

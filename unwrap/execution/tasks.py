@@ -11,6 +11,7 @@ from unwrap.execution.cores import available_cores
 from unwrap.execution.processes import run_in_processes
 from unwrap.execution.ray_tasks import ADDRESS, require_ray, run_on_ray
 from unwrap.execution.work import Executor, Work, task_name
+from unwrap.support import require_choice
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -29,10 +30,7 @@ def check_execution(executor: Executor, workers: int | None) -> None:
     ImportError, ConnectionError
         Ray is not installed, or nobody answers where `RAY_ADDRESS` says.
     """
-    if executor not in RUNNERS:
-        raise ValueError(
-            f"executor is {executor!r}; expected one of {', '.join(get_args(Executor))}"
-        )
+    require_choice(get_args(Executor), executor=executor)
     if workers is not None and workers < 1:
         raise ValueError(f"workers is {workers}; expected at least 1")
     on_cluster = executor == "ray" and ADDRESS in os.environ

@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Literal
 
 from unwrap.networks.network import Network, Settings
+from unwrap.support import require_choice
 
 PLACES = {
     "tofregnet": "unwrap.networks.tofregnet:TofRegNet",
@@ -39,8 +40,7 @@ def network_class(name: str) -> type[Network]:
     ValueError
         There is none of that name.
     """
-    if name not in PLACES:
-        raise ValueError(f"network is {name!r}; expected one of {', '.join(PLACES)}")
+    require_choice(PLACES, network=name)
     module, _, attribute = PLACES[name].partition(":")
     return getattr(import_module(module), attribute)
 

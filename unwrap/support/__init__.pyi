@@ -1,5 +1,6 @@
 from .array_files import MAX_BYTES as MAX_BYTES, read_arrays as read_arrays
 from .checks import (
+    require_choice as require_choice,
     require_floats as require_floats,
     require_not_negative as require_not_negative,
     require_path as require_path,
@@ -15,7 +16,7 @@ from .compiled import (
     loop as loop,
     source_stamp as source_stamp,
 )
-from .error_text import in_one_line as in_one_line
+from .error_text import in_one_line as in_one_line, in_short as in_short
 from .files import (
     building_folder as building_folder,
     replacing as replacing,

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import numbers
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from unwrap.support.error_text import in_short
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -43,7 +46,9 @@ def require_positive(**values: Any) -> None:
         if not isinstance(value, numbers.Real) or isinstance(value, bool):
             raise TypeError(f"{name} is {type(value).__name__}; expected a number")
         if not 1e-15 <= value <= 1e15:  # type: ignore[operator]
-            raise ValueError(f"{name} is {value}; expected a positive number, 1e-15..1e15")
+            raise ValueError(
+                f"{name} is {in_short(value)}; expected a positive number, 1e-15..1e15"
+            )
 
 
 def require_not_negative(**values: Tensor | float) -> None:
@@ -69,3 +74,18 @@ def require_path(**values: Any) -> None:
     for name, value in values.items():
         if not isinstance(value, str | Path):
             raise TypeError(f"{name} is {type(value).__name__}; expected a path")
+
+
+def require_choice(known: Collection[str], **values: Any) -> None:
+    """Raise ValueError unless all are one of the words `known`.
+
+    Examples
+    --------
+    >>> require_choice(("nearest", "floor"), merge=None)
+    Traceback (most recent call last):
+    ...
+    ValueError: merge is None; expected one of nearest, floor
+    """
+    for name, value in values.items():
+        if not isinstance(value, str) or value not in known:
+            raise ValueError(f"{name} is {in_short(value)}; expected one of {', '.join(known)}")

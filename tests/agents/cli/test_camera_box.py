@@ -14,7 +14,7 @@ from agents.policies.learned import NetworkPolicy
 from agents.policies.scheduler_files import Provenance
 from agents.policies.score_networks import score_network
 from shotenv.config.env import EnvConfig
-from shotenv.config.reader import merged, read_config
+from shotenv.config.reader import configs_dir, merged, read_config
 from shotenv.decision.acquire import acquire_depth
 from shotenv.decision.features import FEATURE_NAMES
 from shotenv.decision.problem import open_problem
@@ -33,6 +33,7 @@ CAMERAS = (
     "phasor_video",
 )
 """All but the Kinect's logs, whose images are of one size, and the one for simulation."""
+OTHERS = ("kinect_v2", "blaze")
 TELL_NO_NOISE = ("kinect_v2_dump", "phasor_video")
 WITH_EIGHT = ("mlx75027", "imx556", "arducam_b0548", "kinect_v2_dump")
 """Those that take two frequencies or more; the MLX75027 in the description of one's own."""
@@ -81,6 +82,11 @@ def four_of_first_frame(env_file, unwrapper):
     problem = open_problem(merged(read_config(EnvConfig, env_file), {"unwrapper": unwrapper}))
     drive, first = drive_of_seed(problem, 0), torch.tensor([0])
     return acquire_depth(problem, drive, first, Shots.FOUR)
+
+
+def test_no_shipped_camera_is_forgotten():
+    shipped = {path.stem for path in (configs_dir() / "camera").glob("*.yaml")}
+    assert {*CAMERAS, *OTHERS} == shipped
 
 
 @pytest.mark.parametrize("name", CAMERAS)

@@ -59,7 +59,7 @@ def test_a_place_that_cannot_be_written_to_is_refused_first(
     folder.mkdir()
     wrong = file if is_folder else folder
     for place, says in (
-        (wrong, "expected a f"),
+        (wrong, f"expected a {'folder' if is_folder else 'file'}"),
         (file / "in" / "it", f"{file} is no folder"),
     ):
         status = main(words_of(command, name, place))

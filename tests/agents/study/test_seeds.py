@@ -26,10 +26,10 @@ def config(tiny_kwargs) -> DemoConfig:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("executor", ["local", "ray"])
-def test_each_seed_gives_what_it_gives_alone(config, executor, tmp_path, capsys):
+def test_each_seed_gives_what_it_gives_alone(config, executor, tmp_path, capfd):
     folders = train_seeds(config, [3, 5], tmp_path / "all", executor=executor, workers=2)
     assert [folder.name for folder in folders] == ["seed-3", "seed-5"]
-    assert "return beyond" not in capsys.readouterr().err, "told in the log alone"
+    assert "return beyond" not in capfd.readouterr().err, "told in the log alone"
     assert "return beyond" in (tmp_path / "all" / "seed-5.log").read_text()
     agent = config.agent.model_copy(update={"seed": 5})
     train_scheduler(config.model_copy(update={"agent": agent}), tmp_path / "alone")

@@ -9,6 +9,7 @@ import sys
 import uuid
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from cut_off_places import CutOffFileSystem
@@ -233,11 +234,14 @@ def test_sizes_are_limited_before_anything_is_read(url, source, monkeypatch, tmp
     monkeypatch.setattr(publishing, "LARGEST_JSON_BYTES", 300)
     assert standing_parts(place, "thing") == {}
     huge = listing.files[0].model_copy(update={"bytes": 2**40})
+    free = SimpleNamespace(free=10**9)
+    monkeypatch.setattr("unwrap.storage.fetching.shutil.disk_usage", lambda place: free)
     with pytest.raises(StorageError, match=r"needs 1099\.51 GB .* free"):
         fetch(place, Listing(label="x", files=(huge,)), tmp_path / "fetched")
 
 
-def test_a_missing_backend_is_one_sentence():
+def test_a_missing_backend_is_one_sentence(monkeypatch):
+    monkeypatch.setitem(sys.modules, "adlfs", None)
     with pytest.raises(StorageError, match="unknown://x is no place: Protocol not known"):
         Place("unknown://x")
     with pytest.raises(StorageError, match=r"abfs://x/y needs a package .* adlfs"):

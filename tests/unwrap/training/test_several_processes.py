@@ -79,7 +79,7 @@ def test_the_losses_of_shares_add_up_to_that_of_the_batch(network):
 def test_frames_are_dealt_and_draw_as_in_the_whole_batch():
     shuffles = [EpochShuffle(10, 4, (Shots.TWO, Shots.FOUR), 3, Ranks(r, 3)) for r in range(3)]
     whole = EpochShuffle(10, 4, (Shots.TWO, Shots.FOUR), 3)
-    for order, *own in zip(whole, *shuffles, strict=False):
+    for order, *own in zip(whole, *shuffles, strict=True):
         assert {one.shots for one in own} == {order.shots}
         for rank, one in enumerate(own):
             assert one.numbers == order.numbers[rank::3]
