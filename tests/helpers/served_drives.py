@@ -27,6 +27,7 @@ def client_of(server, laser_power_w=5.0, integration_s=4e-4, **changes):
         "laser_power_w": laser_power_w,
         "integration_s": integration_s,
         "size": (24, 32),
+        "timeout_s": 60.0,
     }
     return EpcCamera("127.0.0.1", server.port, **(told | changes))
 

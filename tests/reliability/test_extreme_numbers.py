@@ -21,7 +21,7 @@ from unwrap.training import TrainConfig
 
 ABSURD = (-1e300, 1e300, 10**30, math.nan, math.inf, -math.inf)
 NONE_PLAYS = {*BAKED_FIELDS, "frame_rate_hz", "max_range_m", "release_k"}
-"""Fields whose ends are all refused: `pocket` has its own, and a temperature lies between others."""
+"""Fields whose ends are all refused: `pocket` has its own, or they lie between two others."""
 LARGEST_REWARD = 1e20
 """Far from the ends of float32; weights at their own ends reach it nearly."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 import uuid
 import zipfile
 from pathlib import Path
@@ -12,6 +11,7 @@ import pytest
 import yaml
 from cut_off_places import CutOffFileSystem
 from short_studies import plan_of
+from watched_processes import wait_until
 
 from agents.cli.entry import main
 from agents.study import job_runs, published_work, seeds
@@ -22,6 +22,7 @@ from agents.study.seeds import train_seeds
 from unwrap.storage.fetching import fetch
 from unwrap.storage.place import Place, StorageError
 from unwrap.storage.publishing import publish_contents, read_contents, standing_parts
+from unwrap.support import write_text
 
 
 def run_here(function, tasks, *_, **__):
@@ -168,12 +169,11 @@ def test_results_of_another_configuration_are_refused_and_kept(files, url):
 
 
 def wait_for(place: Place, folder: str, name: str = "") -> str:
-    for _ in range(500):
-        for found in place.sizes(folder):
-            if found.rpartition("-")[0].endswith(name):
-                return found
-        time.sleep(0.01)
-    raise AssertionError(f"nothing in {folder}")
+    def found() -> list[str]:
+        return [one for one in place.sizes(folder) if one.rpartition("-")[0].endswith(name)]
+
+    wait_until(found)
+    return found()[0]
 
 
 def test_a_training_is_kept_and_resumed(tmp_path, url, monkeypatch):
@@ -183,7 +183,7 @@ def test_a_training_is_kept_and_resumed(tmp_path, url, monkeypatch):
     with pytest.raises(RuntimeError, match="died"), shelf.resumed("a/b-0", told, first):
         first.mkdir()
         for name in ("policy.safetensors", "validation.json", "checkpoint.safetensors"):
-            (first / name).write_text(name)
+            write_text(first / name, name)  # Whole at once: it is packed as soon as it is there.
         there = wait_for(place, "unfinished")
         raise RuntimeError("died")
     with shelf.resumed("a/b-0", told, second):
@@ -224,7 +224,7 @@ def test_what_is_done_leaves_nothing_unfinished_but_others_work(tmp_path, url, m
         folder = tmp_path / name
         with shelf.resumed(name, {}, folder):
             folder.mkdir(parents=True)
-            (folder / "checkpoint.safetensors").write_text(name)
+            write_text(folder / "checkpoint.safetensors", name)
             wait_for(place, "unfinished", name)
     (tmp_path / "a" / "b-0.json").write_text("{}")
     shelf.publish("a/b-0", tmp_path, lambda path: path.startswith(("a/b-0/", "a/b-0.")))
@@ -239,10 +239,7 @@ def test_a_place_that_fails_meanwhile_ends_no_training(tmp_path, monkeypatch, ca
         CutOffFileSystem.reset(fails_at=1)
         (tmp_path / "run").mkdir()
         (tmp_path / "run" / "checkpoint.safetensors").write_text("one")
-        for _ in range(500):
-            if CutOffFileSystem.operations >= 2:
-                break
-            time.sleep(0.01)
+        wait_until(lambda: CutOffFileSystem.operations >= 2)
     assert "connection lost; training goes on" in capsys.readouterr().err
 
 

@@ -66,6 +66,7 @@ def digests(folder) -> dict[str, str]:
     }
 
 
+@pytest.mark.timeout(600)
 def test_a_bank_is_the_same_though_a_machine_dies(config, cluster, tmp_path):
     folder = tmp_path / "ray"
     process = subprocess.Popen(

@@ -179,9 +179,10 @@ def test_what_goes_wrong_beside_the_workers_ends_them_at_once(config, tmp_path, 
     assert ended and kept.tb is not None
 
 
-def test_who_waits_for_another_process_is_told(tmp_path, monkeypatch, capsys):
+def test_who_waits_for_another_process_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(folders, "SILENT_S", 0.05)
-    entered = Event()
+    entered, told, said = Event(), Event(), []
+    monkeypatch.setattr(folders, "say", lambda words: (said.append(words), told.set()))
 
     def wait_and_enter():
         with alone_in(tmp_path):
@@ -190,8 +191,7 @@ def test_who_waits_for_another_process_is_told(tmp_path, monkeypatch, capsys):
     waiting = Thread(target=wait_and_enter)
     with alone_in(tmp_path):
         waiting.start()
-        waiting.join(0.5)
-        assert not entered.is_set()
-    waiting.join(10)
+        assert told.wait(60) and not entered.is_set()
+    waiting.join(60)
     assert entered.is_set()
-    assert capsys.readouterr().err == f"another process writes {tmp_path}; waiting for it\n"
+    assert said == [f"another process writes {tmp_path}; waiting for it"]

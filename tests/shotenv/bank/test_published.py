@@ -283,7 +283,7 @@ def test_links_out_of_a_bank_are_not_published(config, url, tmp_path, where):
     publish_bank(open_bank(folder), url)
 
 
-@pytest.mark.timeout(20)
+@pytest.mark.timeout(60)
 @pytest.mark.parametrize("kind", ["a pipe", "a folder"])
 def test_what_is_no_file_is_named_and_not_waited_for(config, url, tmp_path, kind):
     folder = folder_of(config, tmp_path / "here")

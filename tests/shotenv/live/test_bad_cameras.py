@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import select
 import struct
 import time
 from contextlib import closing
@@ -9,7 +10,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
-from helpers.served_drives import client_of, example_module
+from served_drives import client_of, example_module
 
 from shotenv.live import (
     CameraDisconnectedError,
@@ -23,7 +24,8 @@ from unwrap.signal import Shots
 
 GRAY, SAMPLES = 5, 7
 HEIGHT, WIDTH = 24, 32
-TIMEOUT_S = 0.3
+TIMEOUT_S, PATIENT_S = 0.3, 60.0
+"""Of cameras that are too slow, and of those that fail otherwise, on however busy a machine."""
 ANSWER_BYTES = 13
 
 
@@ -124,7 +126,8 @@ BAD = {
 def test_each_failure_has_its_name(kind):
     command, spoil, error, told = BAD[kind]
     with bad_camera(command, spoil) as server:
-        with closing(client_of(server, timeout_s=TIMEOUT_S)) as camera:
+        slow = error in (CameraTimeoutError, TruncatedFrameError)
+        with closing(client_of(server, timeout_s=TIMEOUT_S if slow else PATIENT_S)) as camera:
             camera.start()
             with pytest.raises(error, match=told) as raised:
                 camera.next_frame()
@@ -132,12 +135,17 @@ def test_each_failure_has_its_name(kind):
         assert str(raised.value).startswith(f"camera 127.0.0.1:{server.port}: ")
 
 
+def wait_for_bytes(camera):
+    """Until something lies there that nobody has read."""
+    assert select.select([camera._socket], [], [], 60.0)[0]
+
+
 def test_what_is_left_of_an_earlier_answer_is_not_taken_for_the_next():
     with bad_camera(GRAY, lambda reply: reply + reply[-100:]) as server:
-        camera = client_of(server, timeout_s=TIMEOUT_S)
+        camera = client_of(server, timeout_s=PATIENT_S)
         camera.start()
         camera.next_frame()
-        time.sleep(0.05)
+        wait_for_bytes(camera)
         with pytest.raises(StaleFrameError, match="100 bytes or more of an earlier answer"):
             camera.acquire(Shots.TWO)
         camera.close()
@@ -159,7 +167,8 @@ def test_a_camera_that_drips_is_not_waited_for():
         began_s = time.monotonic()
         with pytest.raises(TruncatedFrameError, match=r"bytes of the .* within"):
             camera.next_frame()
-        assert time.monotonic() - began_s < 5 * TIMEOUT_S
+        # The whole image would take minutes.
+        assert time.monotonic() - began_s < 30
 
 
 def test_a_temperature_of_another_length_is_none():
@@ -182,7 +191,7 @@ def test_an_answer_that_comes_too_late_does_not_become_that_of_the_next_frame():
         camera.start()
         with pytest.raises(CameraTimeoutError):
             camera.next_frame()
-        time.sleep(TIMEOUT_S)
+        wait_for_bytes(camera)
         with pytest.raises(StaleFrameError):
             camera.next_frame()
         camera.close()

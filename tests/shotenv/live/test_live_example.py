@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import torch
-from helpers.served_drives import client_of, example_module
+from served_drives import client_of, example_module
 
 from shotenv.config import env_config
 from shotenv.sensor import description_of

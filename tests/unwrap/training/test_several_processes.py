@@ -26,6 +26,7 @@ from shared_walls import (
     walls,
 )
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+from watched_processes import end_session, wait_until
 
 from unwrap.networks.registry import NetworkName
 from unwrap.signal.shots import Shots
@@ -256,16 +257,21 @@ def test_a_process_that_dies_or_stops_is_named(source, message, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(600)
 def test_two_machines_train_what_one_process_does_until_one_is_lost(tmp_path):
     """Each is a command of its own, as a user calls it; one process goes on from the last epoch."""
     part, mark = tmp_path / "part", tmp_path / "lost"
     first, second = nodes(part, mark)
-    _, told = first.communicate(timeout=180)
-    # Seconds, though a busy machine takes its time; what hangs is given up after minutes.
-    assert first.returncode == 1 and time.time() - mark.stat().st_mtime < 30
-    assert "process 0 of 1 failed: " in told and "if it lost another machine" in told
-    second.communicate(timeout=10)
-    assert second.returncode == -signal.SIGKILL
+    try:
+        _, told = first.communicate(timeout=400)
+        # Seconds, though a busy machine takes its time; what hangs is given up after minutes.
+        assert first.returncode == 1 and time.time() - mark.stat().st_mtime < 60
+        assert "process 0 of 1 failed: " in told and "if it lost another machine" in told
+        second.communicate(timeout=60)
+        assert second.returncode == -signal.SIGKILL
+    finally:
+        end_session(first)
+        end_session(second)
     assert {path.name for path in part.iterdir()} == {"tensorboard", "tofregnet.ckpt"}
     try:
         train(CONFIG, precise_walls, tmp_path / "whole", progress=False)
@@ -308,10 +314,12 @@ def test_what_raised_first_is_told_also_where_others_end_sooner(tmp_path):
     mark = tmp_path / "raised"
     with pytest.raises(RuntimeError, match="process 1 of 3 failed: ValueError: frame 7 is damaged"):
         run_team(Team(3), raise_before_others, mark)
-    assert time.time() - mark.stat().st_mtime < 10
+    # A connection that hangs is given up after minutes.
+    assert time.time() - mark.stat().st_mtime < 60
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(400)
 def test_ctrl_c_ends_all_processes(tmp_path):
     path = os.pathsep.join(sys.path)
     training = subprocess.Popen(
@@ -319,14 +327,16 @@ def test_ctrl_c_ends_all_processes(tmp_path):
         env={**os.environ, "PYTHONPATH": path},
         stderr=subprocess.PIPE,
         text=True,
+        start_new_session=True,
     )
-    until = time.monotonic() + 180
-    while not (tmp_path / "tofregnet.ckpt").exists():
-        assert training.poll() is None and time.monotonic() < until
-        time.sleep(0.1)
-    family = psutil.Process(training.pid).children(recursive=True)
-    assert len(family) >= 2
-    training.send_signal(signal.SIGINT)
-    _, told = training.communicate(timeout=60)
-    assert "KeyboardInterrupt" in told
-    assert psutil.wait_procs(family, timeout=5)[1] == []
+    try:
+        checkpoint = tmp_path / "tofregnet.ckpt"
+        wait_until(lambda: checkpoint.exists() or training.poll() is not None, seconds=180)
+        family = psutil.Process(training.pid).children(recursive=True)
+        assert len(family) >= 2
+        training.send_signal(signal.SIGINT)
+        _, told = training.communicate(timeout=60)
+        assert "KeyboardInterrupt" in told
+        assert psutil.wait_procs(family, timeout=60)[1] == []
+    finally:
+        end_session(training)
