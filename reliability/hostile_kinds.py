@@ -15,6 +15,14 @@ from typing import Any
 import numpy as np
 import torch
 
+from reliability.hostile_places import (
+    packed,
+    published,
+    read_packed,
+    read_published,
+    read_unfinished,
+    unfinished,
+)
 from reliability.hostile_recordings import (
     camera,
     picture,
@@ -436,4 +444,9 @@ KINDS = (
     Kind("scene (STL)", scene("scene.stl"), read_scene),
     Kind("scene (GLB)", scene("scene.glb"), read_scene),
     Kind("scene (XML)", xml, read_scene),
+    Kind("packed array", packed, read_packed),
+    Kind("contents of a place", published("contents.json"), read_published),
+    Kind("part of a place", published("parts/*/*.json"), read_published),
+    Kind("file on a place", published("objects/*"), read_published),
+    Kind("unfinished training on a place", unfinished, read_unfinished),
 )

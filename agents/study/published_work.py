@@ -29,12 +29,14 @@ from unwrap.storage import (
     publish_part,
     require_storable,
 )
-from unwrap.support import say
+from unwrap.support import in_one_line, say
 
 KEPT_EVERY_S: Final = 300.0
 """So often is looked for a new checkpoint: that much is lost at most with a machine (assumed)."""
 MOST_FILES, MOST_BYTES = 100, 2**33
 """Of what a training has come to."""
+ARCHIVE_END, TAIL = b"PK\5\6", 22 + 2**16
+"""What the record at the end of a ZIP archive begins with, and the bytes that it takes at most."""
 
 
 class Shelf(NamedTuple):
@@ -126,27 +128,37 @@ class Shelf(NamedTuple):
         size = place.size(there)
         if size is None or size > MOST_BYTES:
             return
-        with archive.open("wb") as file:
-            file.writelines(place.pieces(there, size))
-        folder.mkdir(parents=True, exist_ok=True)
         try:
-            with zipfile.ZipFile(archive) as packed:
-                _check_members(packed)
-                packed.extractall(folder)
-        except (zipfile.BadZipFile, zlib.error, ValueError, RuntimeError, EOFError) as error:
+            # Before gigabytes are fetched.
+            if ARCHIVE_END not in b"".join(place.pieces(there, size, start=max(0, size - TAIL))):
+                raise ValueError("no archive")
+            with archive.open("wb") as file:
+                file.writelines(place.pieces(there, size))
+            _check_archive(archive)
+        except StorageError:
+            raise
+        # The last where it leads to places before its beginning.
+        except (zipfile.BadZipFile, zlib.error, ValueError, RuntimeError, EOFError, OSError) as e:
             raise StorageError(
-                f"{place.url}/{there} is damaged ({error}); delete it to train anew"
+                f"{place.url}/{there} is damaged ({in_one_line(e)}); delete it to train anew"
             ) from None
+        folder.mkdir(parents=True, exist_ok=True)
+        with zipfile.ZipFile(archive) as packed:
+            packed.extractall(folder)
 
 
-def _check_members(packed: zipfile.ZipFile) -> None:
-    members = packed.infolist()
-    if len(members) > MOST_FILES or sum(one.file_size for one in members) > MOST_BYTES:
-        raise ValueError(f"expected at most {MOST_FILES} files and {MOST_BYTES} bytes")
-    for one in members:
-        require_storable(one.filename)
-    if (name := packed.testzip()) is not None:
-        raise ValueError(f"{name} is not as it was written")
+def _check_archive(archive: Path) -> None:
+    """Refuse what `_pack` does not write."""
+    with zipfile.ZipFile(archive) as packed:
+        members = packed.infolist()
+        if len(members) > MOST_FILES or sum(one.file_size for one in members) > MOST_BYTES:
+            raise ValueError(f"expected at most {MOST_FILES} files and {MOST_BYTES} bytes")
+        for one in members:
+            require_storable(one.filename)
+            if "/" in one.filename:
+                raise ValueError(f"{one.filename} lies in a folder; expected files alone")
+        if (name := packed.testzip()) is not None:
+            raise ValueError(f"{name} is not as it was written")
 
 
 def _changed_at(folder: Path) -> int | None:

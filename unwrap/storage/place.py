@@ -93,16 +93,16 @@ class Place:
             found = self._files.cat(list(paths))
         return {paths[path]: content for path, content in found.items()}
 
-    def pieces(self, name: str, size: int) -> Iterator[bytes]:
-        """Content of a file of `size` bytes, piece by piece; never more, perhaps less."""
-        for start in range(0, size, PIECE_BYTES):
-            end = min(start + PIECE_BYTES, size)
+    def pieces(self, name: str, size: int, *, start: int = 0) -> Iterator[bytes]:
+        """Content of a file of `size` bytes from `start`, piece by piece; never more."""
+        for begin in range(start, size, PIECE_BYTES):
+            end = min(begin + PIECE_BYTES, size)
             with self._telling("read", name):
-                piece = self._files.cat_file(self._path(name), start=start, end=end)
-            yield piece[: end - start]
+                piece = self._files.cat_file(self._path(name), start=begin, end=end)
+            yield piece[: end - begin]
 
     def size(self, name: str) -> int | None:
-        """Bytes of a file, None where there is none."""
+        """Bytes of a file, None where there is none: a pipe or a device is none."""
         with self._telling("read", name):
             try:
                 about = self._files.info(self._path(name))
@@ -111,7 +111,7 @@ class Place:
                 if isinstance(error.__cause__, OSError):
                     raise error.__cause__ from None
                 return None
-        return None if about["type"] == "directory" else int(about["size"])
+        return int(about["size"]) if about["type"] == "file" else None
 
     def sizes(self, folder: str) -> dict[str, int]:
         """Names of the files under a folder with their bytes; none where there is no folder."""
@@ -120,7 +120,14 @@ class Place:
                 found = self._files.find(self._path(folder), detail=True)
             except FileNotFoundError:
                 return {}
-        return {self._name(path): int(about["size"]) for path, about in found.items()}
+        sizes = {}
+        for path, about in found.items():
+            # What is listed as another thing is a link to a file, or a pipe or a device.
+            is_file = about["type"] == "file"
+            size = int(about["size"]) if is_file else self.size(self._name(path))
+            if size is not None:
+                sizes[self._name(path)] = size
+        return sizes
 
     def write(self, name: str, content: bytes) -> None:
         """Put a small file there, over one of that name."""

@@ -14,8 +14,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from unwrap.support import require_choice
-
 OLDEST_LLVM = 16
 LIBRARY_VARIABLE = "DRJIT_LIBLLVM_PATH"
 CURE = "install one with: apt-get install libllvm19"
@@ -137,8 +135,8 @@ def start_mitsuba(variant: str | None = None) -> Any:
     ValueError
         An unknown variant.
     """
-    if variant is not None:
-        require_choice(VARIANTS, variant=variant)
+    if variant is not None and variant not in VARIANTS:
+        raise ValueError(f"variant is {variant!r}; expected one of {', '.join(VARIANTS)}")
     try:
         import drjit
         import mitsuba

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import subprocess
 import sys
 import uuid
@@ -323,3 +324,17 @@ def test_a_full_disk_leaves_nothing(source, tmp_path, monkeypatch):
     with pytest.raises(StorageError, match=r"cannot write file://.*No space left"):
         publish(place, source)
     assert [path for path in (tmp_path / "place").rglob("*") if path.is_file()] == []
+
+
+def test_pipes_and_devices_on_a_local_place_are_no_files(source, tmp_path):
+    """Opening one would wait, or read, for ever."""
+    place = Place(f"file://{tmp_path}/place")
+    listing = publish_part(place, "thing", "one", source / "one")
+    parts = tmp_path / "place" / "parts" / "thing"
+    os.mkfifo(parts / "pipe.json")
+    (parts / "device.json").symlink_to("/dev/zero")
+    (parts / "nowhere.json").symlink_to(tmp_path / "nowhere")
+    (parts / "link.json").symlink_to(parts / "one.json")
+    assert sorted(place.sizes("parts")) == ["parts/thing/link.json", "parts/thing/one.json"]
+    assert place.read("parts/thing/pipe.json", most_bytes=100) is None
+    assert standing_parts(place, "thing") == {"one": listing, "link": listing}
