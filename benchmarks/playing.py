@@ -90,7 +90,7 @@ def flat() -> dict:
 
 
 def processes() -> list[dict]:
-    """The native vector against one process of a single environment for each drive."""
+    """The native vector against a process of a single environment for each core."""
     cores = len(os.sched_getaffinity(0))
     # More processes than cores would only wait for each other.
     count = max(cores, 2)

@@ -39,7 +39,8 @@ HEAD = """# Licences of what is installed
 shotenv itself is under the MIT licence. It contains no code of the packages below: they are
 installed beside it, each under its own licence, and imported as they are.
 `python docs/licences_table.py` makes this page from what the packages say of themselves, as
-installed with Python 3.11 on Linux.
+installed with Python 3.11 on Linux, with torch's build for processors. The build for GPUs, which
+the default index serves there, also brings NVIDIA's CUDA packages under NVIDIA's own terms.
 
 "Brought by" is the extra of shotenv whose installation brings a package (by way of others, too),
 *shotenv* where every one does; `dev` is only for work on shotenv.

@@ -82,7 +82,7 @@ def two_banks(source: Bank, folder: Path) -> tuple[Bank, Bank]:
 
 
 def sizes(bank: Bank, tick: Callable[[], object]) -> list[dict[str, Any]]:
-    """Bytes of a frame, and time to make and to read it, in each of several ways."""
+    """Bytes of a frame, and time to make it, in each of several ways."""
     ways: dict[str, tuple[bool, int | None]] = {
         "float32, as in memory": (False, None),
         "float32, compressed": (False, 3),

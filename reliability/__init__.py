@@ -1,4 +1,4 @@
-"""What must not break, measured where a test would take too long. `make reliability` runs it all.
+"""What must not break, measured where a test would take too long, by `make reliability`.
 
 Each module with a function `measure(progress) -> list[Row]` is a measurement, named like its file;
 its docstring says what is promised. Its rows are kept in `docs/reliability/NAME.json`, and
