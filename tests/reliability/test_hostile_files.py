@@ -7,6 +7,8 @@ import pytest
 from reliability.hostile_files import tallied
 from reliability.hostile_kinds import KINDS
 
+# A damaged listing of one clip or training is none: it is published again, nothing is refused.
+COUNTED_AS_ABSENT = ("part of a place",)
 SLOW = ("evaluation", "trusted", "recorded", "thinned", "XML", "Kinect")
 
 
@@ -21,4 +23,5 @@ def kinds():
 def test_changed_files_are_taken_or_refused_by_name(kind, count):
     tally = tallied(kind, count)
     assert tally.faults == []
-    assert tally.taken + tally.refused == count and tally.refused > 0
+    assert tally.taken + tally.refused == count
+    assert (tally.refused == 0) == (kind.name in COUNTED_AS_ABSENT)
