@@ -99,17 +99,22 @@ def renderer_error() -> Made:
         for name in names
     ]
     for name in names:
-        taken, *bias = (f"{100 * share:.1f} %" for share in _of_gray_filter(name))
+        taken, *bias = map(_percent, _of_gray_filter(name))
         about = "bias, mean; rms; 99 % of pixels within"
         quantity = f"filter of ambient light, {name.replace('_', ' ')}: {about}"
         rows.append(Row(quantity, f"noise taken: {taken} rms", "; ".join(bias)))
     return figure, rows
 
 
+def _percent(share: float) -> str:
+    return "below its noise" if math.isnan(share) else f"{100 * share:.1f} %"
+
+
 def _of_gray_filter(family: str) -> tuple[float, float, float, float]:
     """Noise that the filter takes, and its bias: mean, rms, and what 99 % of pixels are within.
 
     Shares of the light of pixels above a tenth of the mean; from 32 frames, 512 paths a pixel.
+    The rms is NaN where the noise of these frames hides it.
     """
     from shotenv.render.integrator import trace
     from shotenv.render.surfaces import Surroundings
@@ -140,7 +145,8 @@ def _of_gray_filter(family: str) -> tuple[float, float, float, float]:
     one, other = ((on - off)[half::2].mean(axis=0)[lit] / mean[lit] for half in (0, 1))
     squares = [(image.var(axis=0, ddof=1)[lit] / mean[lit] ** 2).mean() for image in (off, on)]
     bias = (one + other) / 2
-    rms = math.sqrt(max(0.0, (one * other).mean()))
+    square = (one * other).mean()
+    rms = math.sqrt(square) if square > 0 else math.nan
     taken = math.sqrt(max(0.0, squares[0] - squares[1]))
     return taken, abs(bias.mean()), rms, np.quantile(np.abs(bias), 0.99)
 

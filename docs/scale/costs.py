@@ -8,8 +8,6 @@ from scale.growth import SUBJECTS, fitted
 
 PASSES: Final = 30
 """Passes of the recipe of TofRegNet, `configs/unwrap/tofregnet.yaml`."""
-GPU_RENDER_S: Final = 0.012
-"""A frame of 160 x 120 on one H100, scene building not included (measured once, CHANGELOG.md)."""
 GPU_NETWORK_S: Final = 1 / 2449
 """A frame of 320 x 240 of a training step at width 64 on one H100 (docs/gpu.md)."""
 HOUR_S: Final = 3600.0
@@ -41,7 +39,7 @@ def millions(found: dict[str, Any]) -> str:
     frame_mb = fitted(points["rendering"], "disk_mb")[1]
     network_s = fitted(points["network"])[1]
     rows = {
-        "rendering": (fitted(points["rendering"])[1], GPU_RENDER_S),
+        "rendering": (fitted(points["rendering"])[1], None),
         f"TofRegNet, its recipe's {PASSES} passes": (PASSES * network_s, PASSES * GPU_NETWORK_S),
         "playing each once, every pixel": (fitted(points["playing_every_pixel"])[1], None),
         "playing each once, `pocket`": (fitted(points["playing"])[1], None),

@@ -17,10 +17,9 @@ import numpy as np
 Point = dict[str, float]
 """`size`, `core_s` of all cores, `wall_s`, `memory_mb` of the largest process; some have more."""
 
-RENDERED: Final = ((1, 0, 0), (1, 1, 0), (2, 1, 1))
+RENDERED: Final = ((1, 1, 1), (2, 1, 1), (3, 1, 1))
 """Train, validation and test clips of each of five families, 24 frames of 160 x 120 each."""
 FRAMES_PER_CLIP: Final = 24
-LARGEST: Final = "grown-2-1-1"
 OPENED: Final = (4_000, 20_000, 100_000, 500_000, 1_000_000)
 """Frames of banks that are opened, in clips of `LONG_CLIP`."""
 LONG_CLIP: Final = 250
@@ -36,8 +35,8 @@ JUDGED: Final = (6, 12, 24)
 FAMILIES: Final = ("cycle", "snr_threshold", "look_and_hold", "look_and_weigh")
 BESIDE: Final = (0, 2, 4)
 """Of them, families of rules that are tuned and played beside it."""
-PASSES: Final = (1, 2, 4)
-"""Passes of TofRegNet over the training frames of `LARGEST`."""
+PASSES: Final = 8
+"""Passes of TofRegNet over the training frames of each rendered bank."""
 
 
 @dataclass(frozen=True)
@@ -96,18 +95,23 @@ def measured(size: float, command: Sequence[str], cache: Path) -> Point:
 def rendering(folder: Path) -> Iterator[Point]:
     """Banks of the configuration `starter` with more and more clips."""
     for clips in RENDERED:
-        name = "grown-" + "-".join(map(str, clips))
         splits = zip(("train", "validation", "test", "shift"), (*clips, 0), strict=True)
         told = [f"--{split}_clips={count}" for split, count in splits]
         frames = 5 * sum(clips) * FRAMES_PER_CLIP
-        point = measured(frames, shotenv("render", f"--name={name}", *told), folder)
-        disk = sum(p.stat().st_size for p in bank_of(folder, name).rglob("*") if p.is_file())
+        name = f"--name={bank_name(clips)}"
+        point = measured(frames, shotenv("render", name, *told), folder)
+        disk = sum(p.stat().st_size for p in bank_of(folder, clips).rglob("*") if p.is_file())
         yield {**point, "disk_mb": round(disk / 1e6, 2)}
 
 
-def bank_of(folder: Path, name: str) -> Path:
-    """Folder of a bank that `rendering` made."""
-    (bank,) = (folder / "banks").glob(f"{name}-*")
+def bank_name(clips: Sequence[int]) -> str:
+    """Name of the bank that `rendering` makes of so many clips."""
+    return "grown-" + "-".join(map(str, clips))
+
+
+def bank_of(folder: Path, clips: Sequence[int] = RENDERED[-1]) -> Path:
+    """Its folder."""
+    (bank,) = (folder / "banks").glob(f"{bank_name(clips)}-*")
     return bank
 
 
@@ -179,7 +183,7 @@ def playing(folder: Path) -> Iterator[Point]:
 
 def playing_every_pixel(folder: Path) -> Iterator[Point]:
     """The same on every pixel of a rendered bank, whose predictions stand."""
-    bank = str(bank_of(folder, LARGEST))
+    bank = str(bank_of(folder))
     measured(1, python(played(bank, 1)), folder)  # Predicts.
     for steps in FULL_STEPS:
         yield measured(VECTOR * steps, python(played(bank, steps)), folder)
@@ -225,15 +229,20 @@ def comparing(folder: Path) -> Iterator[Point]:
 
 
 def network(folder: Path) -> Iterator[Point]:
-    """TofRegNet as its recipe has it, but for fewer passes: frames x passes."""
+    """TofRegNet as its recipe has it, for fewer passes over more and more frames.
+
+    Passes and validation frames are the same each time: what grows is training alone.
+    """
     recipe = Path(__file__).parents[2] / "configs" / "unwrap" / "tofregnet.yaml"
-    bank = bank_of(folder, LARGEST)
-    frames = 5 * RENDERED[-1][0] * FRAMES_PER_CLIP
-    for passes in PASSES:
-        told = (f"--bank={bank}", f"--epochs={passes}", f"--out={folder / f'network-{passes}'}")
-        yield measured(
-            frames * passes, shotenv("unwrap", "train", f"--config={recipe}", *told), folder
+    for clips in RENDERED:
+        frames = 5 * clips[0] * FRAMES_PER_CLIP
+        told = (
+            f"--bank={bank_of(folder, clips)}",
+            f"--epochs={PASSES}",
+            f"--out={folder / f'network-{frames}'}",
         )
+        command = shotenv("unwrap", "train", f"--config={recipe}", *told)
+        yield measured(frames * PASSES, command, folder)
 
 
 SUBJECTS: Final[dict[str, Subject]] = {

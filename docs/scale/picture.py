@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from scale.costs import GPU_RENDER_S, HOUR_S
+from scale.costs import HOUR_S
 from scale.growth import fitted
 
 SHOWN: Final = {
@@ -35,10 +35,6 @@ def paint(found: dict[str, Any], path: Path) -> None:
         further = np.geomspace(sizes[0], 1e9, 200)
         curve = (max(start_s, 0) + each_s * further) / HOUR_S
         axis.loglog(further, curve, "-", color=color, linewidth=1.2, label=label)
-    gpu = np.geomspace(1e3, 1e9, 50)
-    axis.loglog(
-        gpu, gpu * GPU_RENDER_S / HOUR_S, ":", color="#c2410c", label="rendering, hours of one H100"
-    )
     axis.set_xlabel("frames", fontsize=9)
     axis.set_ylabel("hours of one core", fontsize=9)
     axis.grid(alpha=0.25)
