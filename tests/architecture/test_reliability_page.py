@@ -14,7 +14,6 @@ from reliability.page import MEASUREMENTS, PAGE, PROMISES, page
 from reliability.rows import KEPT, ROOT, Progress, Row
 
 NEITHER = {
-    9: "its measurement takes hours, and was not whole yet",
     12: "no machine of continuous integration has a GPU: the page says what was measured once",
 }
 """Promises that neither tests hold nor a file tells of, and why."""
