@@ -9,7 +9,6 @@ from collections.abc import Callable
 from pathlib import Path
 from unittest import mock
 
-import numpy as np
 import torch
 
 FRAMES, HEIGHT, WIDTH = 2, 16, 24
@@ -17,26 +16,16 @@ FRAMES, HEIGHT, WIDTH = 2, 16, 24
 
 def _bank(folder: Path, storage: str) -> Path:
     """A bank of one small clip for each split."""
-    from shotenv.bank.files import ARRAYS, write_clip, write_manifest
     from shotenv.config import BankConfig, SensorConfig, find_config, merged, read_config
+    from tests.helpers.made_up_clips import write_made_up_bank
 
     sensor = read_config(SensorConfig, find_config("sensor", "epc660"))
-    size = {"camera": {"width": WIDTH, "height": HEIGHT}, "world": {"frames_per_clip": FRAMES}}
-    config = merged(BankConfig(name="small", sensor=sensor), {**size, "storage": storage})
-    per_frame = ("time_s", "ego_speed_m_s", "yaw_rate_rad_s", "gray_exposure_s")
-    records = []
-    for number, split in enumerate(("train", "validation", "test")):
-        random = np.random.default_rng(number)
-        arrays = {
-            name: random.random((FRAMES, *spec.channels, HEIGHT, WIDTH)).astype(spec.dtype)
-            for name, spec in ARRAYS.items()
-        }
-        about = {"name": f"c{number}", "family": "garage", "seed": number, "split": split}
-        where = folder / "clips" / f"c{number}"
-        told = about | dict.fromkeys(per_frame, [0.5] * FRAMES)
-        records.append(write_clip(where, arrays, told, storage=config.storage))
-    write_manifest(folder, config.name, records, (HEIGHT, WIDTH), config)
-    return folder
+    small = {
+        "camera": {"width": WIDTH, "height": HEIGHT},
+        "world": {"frames_per_clip": FRAMES, "families": ["garage"]},
+        **{"train_clips": 1, "validation_clips": 1, "test_clips": 1, "storage": storage},
+    }
+    return write_made_up_bank(merged(BankConfig(name="small", sensor=sensor), small), folder)
 
 
 def packed(folder: Path) -> Path:

@@ -6,6 +6,7 @@ import uuid
 from pathlib import Path
 
 import pytest
+from folder_contents import contents_of
 
 from agents.cli.entry import main
 from unwrap.storage.place import Place
@@ -27,11 +28,6 @@ def url(source) -> str:
     part = publish_part(place, "study", "short/random-0", source, ["short/random-0.npz"])
     publish_contents(place, "study", [part], source, ["results.json"])
     return place.url
-
-
-def contents_of(folder: Path) -> dict[str, bytes]:
-    files = (path for path in folder.rglob("*") if path.is_file())
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
 
 
 def test_all_files_come_and_what_stands_is_kept(url, source, tmp_path, capsys):

@@ -8,24 +8,22 @@ import uuid
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 import torch
 from cut_off_places import CutOffFileSystem
+from folder_contents import contents_of
+from made_up_clips import write_made_up, write_made_up_bank
 
 from shotenv.bank import published
-from shotenv.bank.clip_jobs import ClipJob, clip_jobs
+from shotenv.bank.clip_jobs import clip_jobs
 from shotenv.bank.files import (
     BankError,
     bank_folder,
     fetched_banks,
-    read_clip_record,
     read_manifest,
     verify,
-    write_clip,
     write_manifest,
 )
-from shotenv.bank.files.layout import ARRAYS
 from shotenv.bank.listing.contents import contents_at, contents_of as told_of
 from shotenv.bank.opening import find_thinned, open_bank
 from shotenv.bank.published import (
@@ -67,19 +65,6 @@ def url() -> str:
     return f"memory://{uuid.uuid4().hex}"
 
 
-def write_made_up(job: ClipJob, *, last_bit: float = 0.0) -> None:
-    """A clip of drawn numbers in place of rendered ones; another machine's last bits differ."""
-    random = np.random.default_rng(job.seed)
-    arrays = {
-        name: random.random((FRAMES, *spec.channels, HEIGHT, WIDTH)).astype(spec.dtype)
-        for name, spec in ARRAYS.items()
-    }
-    arrays["active"] += np.float32(last_bit)
-    per_frame = ("time_s", "ego_speed_m_s", "yaw_rate_rad_s", "gray_exposure_s")
-    about = {"name": job.name, "family": job.family, "seed": job.seed, "split": job.split}
-    write_clip(job.folder, arrays, about | dict.fromkeys(per_frame, [0.0] * FRAMES))
-
-
 def render_to(url: str, config: BankConfig, scratch: Path, **changes: float) -> list[str]:
     """As rendering to a place does: what stands is left, each clip published."""
     standing, made = standing_clips(url, config), []
@@ -93,25 +78,10 @@ def render_to(url: str, config: BankConfig, scratch: Path, **changes: float) -> 
     return made
 
 
-def folder_of(config: BankConfig, folder: Path) -> Path:
-    """The same bank, written into a folder as rendering does."""
-    jobs = clip_jobs(config, folder)
-    for job in jobs:
-        write_made_up(job)
-    records = [read_clip_record(job.folder) for job in jobs]
-    write_manifest(folder, config.name, records, (HEIGHT, WIDTH), config)
-    return folder
-
-
-def contents_of(folder: Path) -> dict[str, bytes]:
-    files = (path for path in folder.rglob("*") if path.is_file())
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
-
-
 def test_a_bank_rendered_to_a_place_is_byte_for_byte_that_of_a_folder(config, url, tmp_path):
     assert len(render_to(url, config, tmp_path / "scratch")) == 3
     bank = open_bank(url)
-    written = contents_of(folder_of(config, tmp_path / "here"))
+    written = contents_of(write_made_up_bank(config, tmp_path / "here"))
     fetched = contents_of(bank.folder)
     # What it is rendered from is told beside it, as in the cache folder.
     assert fetched.pop("source.json") and fetched.pop(".lock") == b""
@@ -123,7 +93,7 @@ def test_a_bank_rendered_to_a_place_is_byte_for_byte_that_of_a_folder(config, ur
 
 def test_what_is_in_a_bank_is_told_without_its_arrays(config, url, full, thinned, tmp_path):
     render_to(url, config, tmp_path / "scratch")
-    published = [(open_bank(folder_of(config, tmp_path / "here")), url)]
+    published = [(open_bank(write_made_up_bank(config, tmp_path / "here")), url)]
     for number, bank in enumerate((full, thinned)):
         publish_bank(bank, f"{url}/{number}")
         published.append((bank, f"{url}/{number}"))
@@ -237,7 +207,7 @@ def test_banks_of_any_kind_are_published(config, url, full, thinned, tmp_path):
         assert copy.pop(".lock") == b"" and copy == contents_of(bank.folder)
     assert isinstance(find_thinned(f"{url}/1"), ThinnedBank) and find_thinned(f"{url}/0") is None
     # One that was rendered counts as its configuration's.
-    stands = open_bank(folder_of(config, tmp_path / "here"))
+    stands = open_bank(write_made_up_bank(config, tmp_path / "here"))
     publish_bank(stands, f"{url}/2")
     assert len(standing_clips(f"{url}/2", config)) == 3
 
@@ -271,7 +241,7 @@ def test_links_out_of_a_bank_are_not_published(config, url, tmp_path, where):
     """Whoever made the bank may have meant somebody's keys."""
     (tmp_path / "private").mkdir()
     (tmp_path / "private" / "key").write_text("secret")
-    folder = folder_of(config, tmp_path / "here")
+    folder = write_made_up_bank(config, tmp_path / "here")
     (folder / where).unlink(missing_ok=True)
     (folder / where).symlink_to(tmp_path / "private" / ("" if where == "clips/more" else "key"))
     with pytest.raises(BankError, match=f"{where} leads to .*private.*, out of the bank"):
@@ -286,7 +256,7 @@ def test_links_out_of_a_bank_are_not_published(config, url, tmp_path, where):
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize("kind", ["a pipe", "a folder"])
 def test_what_is_no_file_is_named_and_not_waited_for(config, url, tmp_path, kind):
-    folder = folder_of(config, tmp_path / "here")
+    folder = write_made_up_bank(config, tmp_path / "here")
     odd = folder / "clips" / "00000-garage" / "odd"
     os.mkfifo(odd) if kind == "a pipe" else odd.mkdir()
     with pytest.raises(StorageError, match="odd cannot be published: not a regular file"):
@@ -295,7 +265,7 @@ def test_what_is_no_file_is_named_and_not_waited_for(config, url, tmp_path, kind
 
 @pytest.mark.parametrize("name", ["../../x", "/etc/x", "a\x1b[31m", "a\nb", ""])
 def test_names_of_banks_are_no_paths_and_show_as_they_are(config, tmp_path, name):
-    folder = folder_of(config, tmp_path / "here")
+    folder = write_made_up_bank(config, tmp_path / "here")
     records = read_manifest(folder).clips
     with pytest.raises(ValueError, match="name"):
         write_manifest(folder, name, records, (HEIGHT, WIDTH), config)

@@ -7,6 +7,7 @@ import sys
 import uuid
 
 import pytest
+from folder_contents import contents_of
 from watched_processes import wait_until
 
 from shotenv.bank import build, published
@@ -19,6 +20,8 @@ from shotenv.config.reader import find_config, merged, read_config
 from shotenv.config.sensor import SensorConfig
 
 pytestmark = pytest.mark.render
+
+LOCK = (".lock",)
 
 
 @pytest.fixture(autouse=True)
@@ -47,11 +50,6 @@ def in_a_folder(config, tmp_path_factory):
         return build.build_bank(config, tmp_path_factory.mktemp("folder") / "bank")
 
 
-def files_of(folder) -> dict[str, bytes]:
-    files = (path for path in folder.rglob("*") if path.is_file() and path.name != ".lock")
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
-
-
 def test_rendered_to_a_place_it_is_the_same_bank(config, in_a_folder, monkeypatch):
     """In this process, clip by clip; what stands is left."""
     url, done = f"memory://{uuid.uuid4().hex}", []
@@ -68,7 +66,7 @@ def test_rendered_to_a_place_it_is_the_same_bank(config, in_a_folder, monkeypatc
     build_published(config, url)
     build_published(config, url)
     assert sorted(done) == ["00000-garage", "00001-garage", "00002-garage"]
-    assert files_of(open_bank(url).folder) == files_of(in_a_folder)
+    assert contents_of(open_bank(url).folder, but=LOCK) == contents_of(in_a_folder, but=LOCK)
 
 
 @pytest.mark.slow
@@ -93,4 +91,4 @@ def test_rendering_to_a_place_that_is_killed_goes_on(config, tmp_path):
     assert done.returncode == 0, done.stderr
     assert f"{8 - stood} of 8 clips" in done.stderr and url in done.stdout
     assert verify_published(url) == ()
-    assert files_of(open_bank(url).folder) == files_of(whole)
+    assert contents_of(open_bank(url).folder, but=LOCK) == contents_of(whole, but=LOCK)

@@ -13,11 +13,11 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import settings, strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 from killed_moments import survives
+from made_up_clips import write_made_up
 
 from shotenv.bank import build, published
 from shotenv.bank.clip_jobs import ClipJob, clip_jobs
@@ -30,7 +30,6 @@ from shotenv.bank.files import (
     fetched_banks,
     sha256_of,
     verify,
-    write_clip,
 )
 from shotenv.bank.opening import open_bank
 from shotenv.bank.published import fetch_bank, publish_bank, verify_published
@@ -54,17 +53,10 @@ moments = st.none() | st.integers(0, 80)
 places = st.floats(0, 1, exclude_max=True)
 
 
-def write_made_up(jobs: list[ClipJob], *rest: object) -> None:
-    """In place of rendering: clips of numbers drawn from their seeds."""
+def make_up(jobs: list[ClipJob], *rest: object) -> None:
+    """In place of rendering."""
     for job in jobs:
-        random = np.random.default_rng(job.seed)
-        arrays = {
-            name: random.random((FRAMES, *spec.channels, HEIGHT, WIDTH)).astype(spec.dtype)
-            for name, spec in ARRAYS.items()
-        }
-        per_frame = ("time_s", "ego_speed_m_s", "yaw_rate_rad_s", "gray_exposure_s")
-        about = {"name": job.name, "family": job.family, "seed": job.seed, "split": job.split}
-        write_clip(job.folder, arrays, about | dict.fromkeys(per_frame, [0.5] * FRAMES))
+        write_made_up(job)
 
 
 def publish_made_up(jobs: list[ClipJob], *rest: object) -> None:
@@ -72,7 +64,7 @@ def publish_made_up(jobs: list[ClipJob], *rest: object) -> None:
     for job in jobs:
         with tempfile.TemporaryDirectory() as scratch:
             here = replace(job, folder=Path(scratch) / job.name)
-            write_made_up([here])
+            write_made_up(here)
             published.publish_clip(job.url, here)
 
 
@@ -116,7 +108,7 @@ class StoreMachine(RuleBasedStateMachine):
         self.url = f"file://{self.place}"
         self.patch = pytest.MonkeyPatch()
         self.patch.setenv("SHOTENV_CACHE", str(self.root / "cache"))
-        self.patch.setattr(build, "render_clips", write_made_up)
+        self.patch.setattr(build, "render_clips", make_up)
         self.patch.setattr(published, "render_clips", publish_made_up)
         self.patch.setattr(os, "fsync", lambda descriptor: None)
         # What is killed here is no process of its own: what it has left has an owner that runs.

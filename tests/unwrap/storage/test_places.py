@@ -14,6 +14,7 @@ from types import SimpleNamespace
 
 import pytest
 from cut_off_places import CutOffFileSystem
+from folder_contents import contents_of
 
 from unwrap.storage import publishing
 from unwrap.storage.fetching import damaged_files, fetch
@@ -51,11 +52,6 @@ def url(request, tmp_path) -> str:
 def publish(place: Place, source: Path) -> Listing:
     parts = [publish_part(place, "thing", p, source / p, under=p) for p in PARTS]
     return publish_contents(place, "thing", parts, source, ["table.json"])
-
-
-def contents_of(folder: Path) -> dict[str, bytes]:
-    files = (path for path in folder.rglob("*") if path.is_file())
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
 
 
 def test_what_is_published_is_fetched_byte_for_byte(url, source, tmp_path):
