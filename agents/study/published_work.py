@@ -128,15 +128,15 @@ class Shelf(NamedTuple):
         size = place.size(there)
         if size is None or size > MOST_BYTES:
             return
-        try:
-            # Before gigabytes are fetched.
-            if ARCHIVE_END not in b"".join(place.pieces(there, size, start=max(0, size - TAIL))):
-                raise ValueError("no archive")
+        # Before gigabytes are fetched.
+        is_archive = ARCHIVE_END in b"".join(place.pieces(there, size, start=max(0, size - TAIL)))
+        if is_archive:
             with archive.open("wb") as file:
                 file.writelines(place.pieces(there, size))
+        try:
+            if not is_archive:
+                raise ValueError("no archive")
             _check_archive(archive)
-        except StorageError:
-            raise
         # The last where it leads to places before its beginning.
         except (zipfile.BadZipFile, zlib.error, ValueError, RuntimeError, EOFError, OSError) as e:
             raise StorageError(

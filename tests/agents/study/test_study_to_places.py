@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import tempfile
 import uuid
 import zipfile
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -215,6 +217,21 @@ def test_a_training_is_kept_and_resumed(tmp_path, url, monkeypatch):
     with pytest.raises(StorageError, match=odd), shelf.resumed("a/b-0", told, other):
         pass
     assert not (tmp_path / "outside").exists() and not other.exists()
+
+
+def test_a_full_disk_of_this_machine_is_no_damage_of_the_place(tmp_path, url, monkeypatch):
+    monkeypatch.setattr(published_work, "KEPT_EVERY_S", 0.02)
+    shelf, full, folder = Shelf(url, "study"), tmp_path / "full", tmp_path / "run"
+    with shelf.resumed("a/b-0", {}, folder):
+        folder.mkdir()
+        write_text(folder / "checkpoint.safetensors", "checkpoint")
+        wait_for(Place(url), "unfinished")
+    full.mkdir()
+    (full / "unfinished.zip").symlink_to("/dev/full")
+    monkeypatch.setattr(tempfile, "TemporaryDirectory", lambda: nullcontext(str(full)))
+    with pytest.raises(OSError, match="No space left") as told, shelf.resumed("a/b-0", {}, folder):
+        pass
+    assert "damaged" not in str(told.value)
 
 
 def test_what_is_done_leaves_nothing_unfinished_but_others_work(tmp_path, url, monkeypatch):
