@@ -48,9 +48,11 @@ def main() -> None:
             parser.error(f"NAME is {name!r}; expected one of {', '.join(BENCHMARKS)}")
     rows = []
     for name in arguments.names:
-        rows += importlib.import_module(f"benchmarks.{name}").run()
-    for row in rows:
-        print(printed(row))
+        print(f"{name} ...", flush=True)
+        found = importlib.import_module(f"benchmarks.{name}").run()
+        for row in found:
+            print(printed(row), flush=True)
+        rows += found
     arguments.json.write_text(json.dumps(rows, indent=1) + "\n")
     print(f"Numbers: {arguments.json}")
 
