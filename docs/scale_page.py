@@ -1,6 +1,7 @@
 """The tables of `docs/scale.md` and its picture: what frames, drives and policies cost.
 
 python docs/scale_page.py --measure     # measures first; best where nothing else runs
+python docs/scale_page.py --measure judging comparing       # these alone, and what they need
 python docs/scale_page.py
 
 What was measured is kept in `docs/scale/growth.json`. The picture needs matplotlib.
@@ -10,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,9 +37,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--measure", action="store_true", help="measure anew")
-    if parser.parse_args().measure:
-        write_json(NUMBERS, growth.measure(print))
+    subjects = ", ".join(growth.SUBJECTS)
+    parser.add_argument(
+        "--measure", nargs="*", metavar="NAME", help=f"measure anew, all or some of {subjects}"
+    )
+    names = parser.parse_args().measure
+    for name in names or ():
+        if name not in growth.SUBJECTS:
+            parser.error(f"NAME is {name!r}; expected some of {subjects}")
+    if names is not None:
+        kept = json.loads(NUMBERS.read_text(encoding="utf-8"))["points"] if names else None
+        write_json(NUMBERS, growth.measure(partial(print, flush=True), names, kept))
     found = json.loads(NUMBERS.read_text(encoding="utf-8"))
     PAGE.write_text(filled(PAGE.read_text(encoding="utf-8"), found), encoding="utf-8")
     paint(found, PICTURE)

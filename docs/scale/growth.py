@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -30,8 +30,9 @@ FULL_STEPS: Final = (64, 128, 256)
 """The same on every pixel."""
 LEARNT: Final = (64, 128, 256)
 """Drives that the regression learns from."""
-JUDGED: Final = (6, 12, 24)
-"""Drives on which a scheduler is judged with all that stands beside it."""
+JUDGED: Final = (24, 192, 384)
+"""Drives on which a scheduler is judged with all that stands beside it; to tune that takes longer
+than to play some tens of them."""
 FAMILIES: Final = ("cycle", "snr_threshold", "look_and_hold", "look_and_weigh")
 BESIDE: Final = (0, 2, 4)
 """Of them, families of rules that are tuned and played beside it."""
@@ -49,11 +50,14 @@ class Subject:
         What is done, and what its size counts.
     measure : callable
         Yields the points; its folder is that of all subjects, in their order.
+    needs : str
+        Name of a subject whose banks or schedulers it takes; empty: none.
     """
 
     what: str
     unit: str
     measure: Callable[[Path], Iterator[Point]]
+    needs: str = ""
 
 
 def shotenv(*words: object) -> list[str]:
@@ -248,12 +252,16 @@ def network(folder: Path) -> Iterator[Point]:
 SUBJECTS: Final[dict[str, Subject]] = {
     "rendering": Subject("rendering, 160 x 120", "frame", rendering),
     "opening": Subject("opening a bank", "frame", opening),
-    "network": Subject("training TofRegNet, 160 x 120", "frame and pass", network),
+    "network": Subject("training TofRegNet, 160 x 120", "frame and pass", network, "rendering"),
     "playing": Subject("playing `pocket`", "step", playing),
-    "playing_every_pixel": Subject("playing every pixel, 160 x 120", "step", playing_every_pixel),
+    "playing_every_pixel": Subject(
+        "playing every pixel, 160 x 120", "step", playing_every_pixel, "rendering"
+    ),
     "learning": Subject("training a scheduler (regression)", "drive", learning),
-    "judging": Subject("judging a scheduler", "drive", judging),
-    "comparing": Subject("judging it beside rules, 6 drives", "family of rules", comparing),
+    "judging": Subject("judging a scheduler", "drive", judging, "learning"),
+    "comparing": Subject(
+        "judging it beside rules, 6 drives", "family of rules", comparing, "learning"
+    ),
 }
 """In their order: later ones use what earlier ones left in the folder."""
 
@@ -265,13 +273,21 @@ def fitted(points: Sequence[Point], of: str = "core_s") -> tuple[float, float]:
     return float(start), float(slope)
 
 
-def measure(told: Callable[[str], Any]) -> dict[str, Any]:
-    """Points of every subject, with the machine that gave them."""
-    found = {}
+def measure(
+    told: Callable[[str], Any], names: Sequence[str] = (), kept: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Points of every subject, with the machine that gave them.
+
+    Of the subjects `names` alone and those that they need, where some are named; points of the
+    others are those of `kept`.
+    """
+    needed = {*names, *(SUBJECTS[name].needs for name in names)} if names else set(SUBJECTS)
+    found = {} if kept is None else dict(kept)
     with tempfile.TemporaryDirectory() as folder:
-        for name, subject in SUBJECTS.items():
+        for name in (name for name in SUBJECTS if name in needed):
             found[name] = []
-            for point in subject.measure(Path(folder)):
-                told(f"{subject.what}: {point}")
+            for point in SUBJECTS[name].measure(Path(folder)):
+                told(f"{SUBJECTS[name].what}: {point}")
                 found[name].append(point)
-    return {"cores": os.cpu_count(), "date": time.strftime("%Y-%m-%d"), "points": found}
+    points = {name: found[name] for name in SUBJECTS}
+    return {"cores": os.cpu_count(), "date": time.strftime("%Y-%m-%d"), "points": points}

@@ -72,7 +72,7 @@ def run_on_ray(
     tasks_per_worker: int,
 ) -> Generator[Done, None, None]:
     """Tasks as they finish; see `run_tasks`."""
-    with _connected(workers) as ray:
+    with connected(workers) as ray:
         cores, gpus = _held(ray, "CPU"), _held(ray, "GPU") if work.gpu else []
         workers = workers or sum(gpus) or max(1, sum(cores) // (threads or 1))
         # No more than the smallest machine has: a task that fits nowhere would wait for ever.
@@ -203,8 +203,11 @@ def _held(ray: Any, resource: str) -> list[int]:
 
 
 @contextmanager
-def _connected(workers: int | None) -> Iterator[Any]:
-    """The module `ray`, connected to a cluster; one that was started for it ends with it."""
+def connected(workers: int | None) -> Iterator[Any]:
+    """The module `ray`, connected to a cluster; one that was started for it ends with it.
+
+    Tasks that are given meanwhile run there.
+    """
     ray = _imported()
     if ray.is_initialized():
         yield ray

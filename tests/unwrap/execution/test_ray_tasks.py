@@ -24,7 +24,7 @@ from unwrap.support import workers
 @pytest.fixture(scope="module", autouse=True)
 def ray():
     """One Ray for all of these tests, which takes seconds to start."""
-    with ray_tasks._connected(2) as module:
+    with ray_tasks.connected(2) as module:
         yield module
 
 
